@@ -1,0 +1,147 @@
+//! From binary trees to nodes of eight children.
+
+use super::{
+    build::{Below, BinaryNode, Box3},
+    node::{LEAF, Node},
+};
+
+/// What leaves are, and what they cost compared with testing one node.
+#[derive(Clone, Copy, Debug)]
+pub struct LeafRule {
+    /// Most boxes in a leaf, at most 8.
+    pub most: u32,
+    /// Cost of visiting a leaf, of any size.
+    pub cost: f32,
+}
+
+/// Nodes and root reference.
+pub struct Collapsed {
+    /// All nodes.
+    pub nodes: Vec<Node>,
+    /// Reference to the root, which is a leaf when there is nothing else.
+    pub root: u32,
+}
+
+/// For every node of the binary tree: the least cost of its subtree when it takes up one, two, ... seven places of a wide node, and how to
+/// reach it (Wald et al., "Getting Rid of Packets", 2008; Ylitie et al., "Efficient Incoherent Ray Traversal on GPUs Through
+/// Compressed Wide BVHs", 2017, section 3.1).
+struct Plan {
+    cost: [f32; 7],
+    /// `split[k - 1]`: with k places, how many go to the first child; 0: use one place less.
+    split: [u8; 7],
+    /// How many of a wide node's eight places go to the first child, where this node becomes one; 0 where it becomes a leaf.
+    wide: u8,
+    count: u32,
+}
+
+/// Collapses by least surface area cost. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).
+pub fn collapse(binary: &[BinaryNode], rule: LeafRule, mut leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
+    let plans = plan(binary, rule);
+    let mut out = Collapsed { nodes: Vec::new(), root: LEAF };
+    let mut content = Vec::new();
+    let mut reference = |at: usize, next_node: usize| {
+        if plans[at].wide > 0 {
+            return (next_node as u32, true);
+        }
+        content.clear();
+        boxes_below(binary, at, &mut content);
+        content.sort_unstable();
+        (LEAF | leaf(&content), false)
+    };
+    let (root, inner) = reference(0, 0);
+    out.root = root;
+    let mut work = Vec::new();
+    if inner {
+        out.nodes.push(Node::EMPTY);
+        work.push((0usize, 0usize));
+    }
+    while let Some((at, place)) = work.pop() {
+        let mut children = Vec::with_capacity(8);
+        if let Below::Pair(first) = binary[at].below {
+            gather(binary, &plans, first as usize, plans[at].wide.into(), &mut children);
+            gather(binary, &plans, first as usize + 1, 8 - usize::from(plans[at].wide), &mut children);
+        }
+        // Any-hit traversal takes children in order: large ones are hit most.
+        children.sort_by(|&a, &b| binary[b].bounds.half_area().total_cmp(&binary[a].bounds.half_area()).then(a.cmp(&b)));
+        let mut node = Node::EMPTY;
+        for (slot, &child) in children.iter().enumerate() {
+            let Box3 { min, max } = binary[child].bounds;
+            for axis in 0..3 {
+                node.bounds[axis][slot] = min[axis];
+                node.bounds[3 + axis][slot] = max[axis];
+            }
+            let (reference, inner) = reference(child, out.nodes.len());
+            node.children[slot] = reference;
+            if inner {
+                work.push((child, out.nodes.len()));
+                out.nodes.push(Node::EMPTY);
+            }
+        }
+        out.nodes[place] = node;
+    }
+    out
+}
+
+fn plan(binary: &[BinaryNode], rule: LeafRule) -> Vec<Plan> {
+    let mut plans: Vec<Plan> = binary.iter().map(|_| Plan { cost: [0.0; 7], split: [0; 7], wide: 0, count: 1 }).collect();
+    for at in (0..binary.len()).rev() {
+        let area = binary[at].bounds.half_area();
+        let Below::Pair(first) = binary[at].below else {
+            plans[at].cost = [area * rule.cost; 7];
+            continue;
+        };
+        let (left, right) = (&plans[first as usize], &plans[first as usize + 1]);
+        let best_split = |places: usize| {
+            let cost = |k: usize| left.cost[k - 1] + right.cost[places - k - 1];
+            let fits = |k: &usize| *k <= 7 && places - k <= 7;
+            (1..places)
+                .filter(fits)
+                .map(|k| (cost(k), k as u8))
+                .fold((f32::INFINITY, 1), |best, next| if next.0 < best.0 { next } else { best })
+        };
+        let mut here = Plan { cost: [0.0; 7], split: [0; 7], wide: 0, count: left.count + right.count };
+        let (below, wide) = best_split(8);
+        let as_leaf = if here.count <= rule.most { area * rule.cost } else { f32::INFINITY };
+        if as_leaf <= area + below {
+            here.cost[0] = as_leaf;
+        } else {
+            here.cost[0] = area + below;
+            here.wide = wide;
+        }
+        for places in 2..=7 {
+            let (cost, split) = best_split(places);
+            here.cost[places - 1] = here.cost[places - 2];
+            if cost < here.cost[places - 2] {
+                here.cost[places - 1] = cost;
+                here.split[places - 1] = split;
+            }
+        }
+        plans[at] = here;
+    }
+    plans
+}
+
+/// The nodes that take up to `places` places for the subtree at `at`.
+fn gather(binary: &[BinaryNode], plans: &[Plan], at: usize, mut places: usize, out: &mut Vec<usize>) {
+    while places > 1 && plans[at].split[places - 1] == 0 {
+        places -= 1;
+    }
+    match binary[at].below {
+        Below::Pair(first) if places > 1 => {
+            let split = usize::from(plans[at].split[places - 1]);
+            gather(binary, plans, first as usize, split, out);
+            gather(binary, plans, first as usize + 1, places - split, out);
+        }
+        _ => out.push(at),
+    }
+}
+
+fn boxes_below(binary: &[BinaryNode], at: usize, out: &mut Vec<u32>) {
+    match binary[at].below {
+        Below::Leaf(index) => out.push(index),
+        Below::Pair(first) => {
+            boxes_below(binary, first as usize, out);
+            boxes_below(binary, first as usize + 1, out);
+        }
+    }
+}

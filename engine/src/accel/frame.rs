@@ -1,0 +1,116 @@
+//! Coordinates in which a tree's boxes fit f32 well, and rays in them.
+
+use std::array::from_fn;
+
+use glam::DVec3;
+
+use crate::{math::max_abs, shape::Bounds};
+
+/// Centre and power-of-two scale that take everything in a tree into [-1, 1]. So f32 boxes are tight wherever the tree lies in the world, and
+/// a tree scaled by a power of two is traversed in the same steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Normalisation {
+    center: DVec3,
+    scale: f64,
+}
+
+/// Bound on the relative error, in f64, of moving a ray's start.
+const START_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// A ray in normalised coordinates, ready for conservative tests against f32 boxes.
+///
+/// Rounding is covered twice: the origin is moved outwards by `2^-22 max(1, |origin|)` on the side that each bound is compared with, which covers the
+/// rounding of the origin and of the boxes, and reciprocals are shrunk for near bounds and grown for far bounds by 2^-21, which covers the four
+/// roundings of a product. A ray from far away starts anew before the tree, so that its rounding is that of a near one. Parameters are
+/// `ratio` times those of the original ray, less `start`.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxRay {
+    /// Every array has x, y, z and one place more, which fills a vector.
+    pub(super) origin: [f32; 4],
+    pub(super) direction: [f32; 4],
+    /// Origin as the near bounds see it, and as the far bounds see it.
+    pub(super) origin_near: [f32; 4],
+    pub(super) origin_far: [f32; 4],
+    pub(super) inverse_near: [f32; 4],
+    pub(super) inverse_far: [f32; 4],
+    /// Where the direction is negative: the near bound is the upper one.
+    pub(super) negative: [bool; 3],
+    /// 1 + |origin|, and 2^18 times the error of a ray that started anew: filters allow for errors of 2^-18 of this.
+    pub(super) magnitude: f32,
+    ratio: f64,
+    start: f64,
+}
+
+impl Normalisation {
+    /// For things in a finite box.
+    pub fn of(bounds: Bounds) -> Self {
+        let center = bounds.min + (bounds.max - bounds.min) * 0.5;
+        let half = max_abs(bounds.max - center).max(max_abs(bounds.min - center));
+        Self { center, scale: if half > f64::MIN_POSITIVE * 4.0 { power_of_two_below(1.0 / half) } else { 1.0 } }
+    }
+
+    /// A point in normalised coordinates.
+    #[inline(always)]
+    pub fn point(&self, p: DVec3) -> DVec3 {
+        (p - self.center) * self.scale
+    }
+
+    /// A length in normalised coordinates.
+    pub fn length(&self, length: f64) -> f64 {
+        length * self.scale
+    }
+
+    /// A ray in normalised coordinates. `direction` has any length but 0.
+    #[inline(always)]
+    pub fn ray<const UNIT_LENGTH: bool>(&self, origin: DVec3, direction: DVec3) -> BoxRay {
+        /// From here on a ray starts anew.
+        const FAR: f64 = 4.0;
+        /// Components of the direction below this are raised to it: over the distances that matter, up to 4 (1 + |origin|), the change
+        /// stays far below the outward shift of the origin.
+        const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
+        const SHRUNK: f32 = 1.0 - 1.0 / (1 << 21) as f32;
+        const GROWN: f32 = 1.0 + 1.0 / (1 << 21) as f32;
+        let unit = if UNIT_LENGTH { 1.0 } else { power_of_two_below(1.0 / max_abs(direction)) };
+        let mut p = self.point(origin);
+        let d = direction * unit;
+        let mut start = 0.0;
+        let distance = max_abs(p);
+        if distance > FAR {
+            // No component can come to within 1 of the centre sooner than this.
+            start = (distance - 2.0) / max_abs(d);
+            p += d * start;
+        }
+        let origin = [p.x, p.y, p.z, 0.0].map(|x| x as f32);
+        let direction = [d.x, d.y, d.z, 1.0].map(|x| x as f32);
+        let size = origin[0].abs().max(origin[1].abs()).max(origin[2].abs());
+        let shift = size.max(1.0) * (1.0 / (1 << 22) as f32) + (start * START_ERROR) as f32;
+        let outward = direction.map(|x| shift.copysign(x));
+        let inverse = direction.map(|x| 1.0 / x.abs().max(SMALLEST).copysign(x));
+        BoxRay {
+            origin,
+            direction,
+            origin_near: from_fn(|i| origin[i] + outward[i]),
+            origin_far: from_fn(|i| origin[i] - outward[i]),
+            inverse_near: inverse.map(|x| x * SHRUNK),
+            inverse_far: inverse.map(|x| x * GROWN),
+            negative: from_fn(|i| direction[i].is_sign_negative()),
+            magnitude: 1.0 + size + (start * START_ERROR) as f32 * (1 << 18) as f32,
+            ratio: self.scale / unit,
+            start,
+        }
+    }
+}
+
+impl BoxRay {
+    /// A parameter of the original ray as a limit for boxes, rounded up.
+    #[inline(always)]
+    pub fn limit(&self, t: f64) -> f32 {
+        (t * self.ratio - self.start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + (self.start * START_ERROR) as f32
+    }
+}
+
+/// The largest power of two that is not above a positive normal number.
+#[inline(always)]
+pub(super) fn power_of_two_below(x: f64) -> f64 {
+    f64::from_bits(x.to_bits() & 0x7ff0_0000_0000_0000)
+}

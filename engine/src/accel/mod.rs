@@ -1,0 +1,31 @@
+//! Finding what a ray meets: bounding volume hierarchies and their traversal.
+//!
+//! obvhs builds binary trees; `collapse` turns them into nodes of eight children, `traverse` walks those, eight boxes at a time. Two such levels
+//! make a scene: a top level over objects, and one tree for every mesh, shared by all its instances.
+//!
+//! Boxes and triangle filters are f32 and *conservative*: they may let a ray through in vain, but never lose a hit. What is a hit, and
+//! where, is decided in f64 alone (`shape`). So hits depend neither on the tree nor on the vector width, and equal distances are told
+//! apart by the objects' order.
+
+mod build;
+mod collapse;
+mod frame;
+mod median;
+mod mesh;
+mod node;
+mod pack;
+mod pencil;
+mod simd;
+mod spheres;
+mod traverse;
+mod tree;
+
+pub use collapse::LeafRule;
+pub use mesh::{MeshHit, MeshTree};
+pub use pencil::Pencil;
+#[cfg(target_arch = "x86_64")]
+pub(crate) use simd::Avx2;
+pub use simd::Simd;
+pub(crate) use simd::{Baseline, Lanes};
+pub use spheres::{MOST as MOST_LISTED_SPHERES, SphereList};
+pub use tree::Tree;

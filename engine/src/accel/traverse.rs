@@ -1,0 +1,109 @@
+//! The walk through a tree: one body for nearest and any hit, for every vector width.
+
+use std::{array::from_fn, mem::MaybeUninit, ops::ControlFlow};
+
+use super::{
+    frame::BoxRay,
+    node::{LEAF, Node},
+    simd::Lanes,
+};
+
+/// Entries of the traversal stack. Every level leaves at most seven; builders keep trees below `MAX_DEPTH`.
+const STACK: usize = 1024;
+
+/// Deepest tree that may be traversed.
+pub const MAX_DEPTH: usize = (STACK - 8) / 7;
+
+/// Visits the leaves whose boxes the ray meets before a limit (see [`BoxRay::limit`]) that every visit says anew; nearest boxes first, unless `ANY`, which saves the sorting.
+///
+/// # Safety
+/// `nodes` is a tree made by `collapse` with root `root`: its references are in range and its depth is at most `MAX_DEPTH`. The processor has the
+/// instructions of `L`.
+#[inline(always)]
+pub unsafe fn traverse<L: Lanes, const ANY: bool>(
+    nodes: &[Node],
+    root: u32,
+    ray: &BoxRay,
+    mut limit: f32,
+    mut leaf: impl FnMut(u32) -> ControlFlow<(), f32>,
+) {
+    // SAFETY: by this function's own conditions.
+    unsafe {
+        let lanes = |v: [f32; 4]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
+        let (origin_near, origin_far) = (lanes(ray.origin_near), lanes(ray.origin_far));
+        let (inverse_near, inverse_far) = (lanes(ray.inverse_near), lanes(ray.inverse_far));
+        let near_bound: [usize; 3] = from_fn(|axis| axis + if ray.negative[axis] { 3 } else { 0 });
+        let zero = L::splat(0.0);
+        let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
+        let stack = stack.as_mut_ptr().cast::<u64>();
+        let mut height = 0usize;
+        let mut current = root;
+        let mut entry = [0f32; 8];
+        loop {
+            if current & LEAF == 0 {
+                let node = nodes.get_unchecked(current as usize);
+                let near =
+                    |axis: usize| L::load(node.bounds.get_unchecked(near_bound[axis])).sub(origin_near[axis]).mul(inverse_near[axis]);
+                let far = |axis: usize| {
+                    L::load(node.bounds.get_unchecked(2 * axis + 3 - near_bound[axis])).sub(origin_far[axis]).mul(inverse_far[axis])
+                };
+                let enter = near(0).max(near(1)).max(near(2).max(zero));
+                let leave = far(0).min(far(1)).min(far(2).min(L::splat(limit)));
+                let mut hits = enter.le(leave);
+                if hits != 0 {
+                    let first = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    if hits == 0 {
+                        current = *node.children.get_unchecked(first);
+                        continue;
+                    }
+                    if ANY {
+                        while hits != 0 {
+                            *stack.add(height) = u64::from(*node.children.get_unchecked(hits.trailing_zeros() as usize));
+                            height += 1;
+                            hits &= hits - 1;
+                        }
+                        current = *node.children.get_unchecked(first);
+                        continue;
+                    }
+                    // Distances are not negative, so their bits order as they do; child references make the order total.
+                    enter.store(&mut entry);
+                    let key = |i: usize| u64::from(entry.get_unchecked(i).to_bits()) << 32 | u64::from(*node.children.get_unchecked(i));
+                    let mut nearest = key(first);
+                    let base = height;
+                    while hits != 0 {
+                        let other = key(hits.trailing_zeros() as usize);
+                        hits &= hits - 1;
+                        let farther = nearest.max(other);
+                        nearest = nearest.min(other);
+                        let mut place = height;
+                        while place > base && *stack.add(place - 1) < farther {
+                            *stack.add(place) = *stack.add(place - 1);
+                            place -= 1;
+                        }
+                        *stack.add(place) = farther;
+                        height += 1;
+                    }
+                    current = nearest as u32;
+                    continue;
+                }
+            } else {
+                match leaf(current & !LEAF) {
+                    ControlFlow::Continue(lower) => limit = lower,
+                    ControlFlow::Break(()) => return,
+                }
+            }
+            loop {
+                if height == 0 {
+                    return;
+                }
+                height -= 1;
+                let top = *stack.add(height);
+                current = top as u32;
+                if ANY || f32::from_bits((top >> 32) as u32) <= limit {
+                    break;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! How light is followed through the scene.
+
+use serde::{Deserialize, Serialize};
+
+/// The integrator and its settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Render {
+    /// Nearest hit only ("first rank" of the paper): every light shines on it unhindered; mirror and glass show as diffuse of their reflectance.
+    Raycast,
+    /// Whitted's ray tracing ("higher rank"): nearest hit, a shadow ray to every light, reflected and refracted rays.
+    Whitted {
+        /// Longest chain of rays, the camera's ray included; at least 1. What a longer chain would bring is left out.
+        max_depth: u32,
+        /// Whether glass lets shadow rays pass, weakened by its transmittance once at every surface. Not physical: glass then casts no caustic
+        /// and no shadow.
+        transparent_shadows: bool,
+        /// Rays whose weight in the pixel is this or less are not traced; 0 traces all.
+        min_weight: f64,
+    },
+}

@@ -1,0 +1,54 @@
+//! Textures: colours that vary over a surface.
+
+use serde::{Deserialize, Serialize};
+
+use super::{AssetId, Rgb, SourceId};
+
+/// Index into [`super::Scene::textures`].
+pub type TextureId = u32;
+
+/// A colour for every uv.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Texture {
+    /// Squares of two colours: `even` where `floor(u / size) + floor(v / size)` is even.
+    Checker {
+        /// Colour of the even squares.
+        even: Rgb,
+        /// Colour of the odd squares.
+        odd: Rgb,
+        /// Edge of a square in units of uv, above 0.
+        size: f64,
+    },
+    /// An image file (PNG, JPEG or Radiance HDR), bilinearly interpolated; its first row lies at v = 0 (glTF's convention).
+    Image {
+        /// The file.
+        file: AssetId,
+        /// How its numbers are coded.
+        color_space: ColorSpace,
+        /// What lies beyond u in [0, 1] and v in [0, 1].
+        wrap: [Wrap; 2],
+        /// Where the script made it.
+        #[serde(skip)]
+        source: SourceId,
+    },
+}
+
+/// How an image's numbers become linear colours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum ColorSpace {
+    /// IEC 61966-2-1.
+    Srgb,
+    /// The numbers are linear.
+    Linear,
+}
+
+/// What lies beyond the edge of an image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Wrap {
+    /// The image again.
+    Repeat,
+    /// The image mirrored.
+    Mirror,
+    /// Its outermost pixels.
+    Clamp,
+}

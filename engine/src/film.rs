@@ -1,0 +1,116 @@
+//! The film: the whole frame, put together from parts.
+
+use crate::part::{Rect, RenderedPart};
+
+/// The pixels of a frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Film {
+    width: u32,
+    height: u32,
+    pixels: Vec<[f32; 3]>,
+}
+
+/// A part that lies beyond the film, or whose pixels are not as many as its rectangle says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("a part of {pixels} pixels at {rect:?} does not fit on a film of {width} x {height} pixels")]
+pub struct Misplaced {
+    /// Where the part was to stand.
+    pub rect: Rect,
+    /// Pixels that it has.
+    pub pixels: usize,
+    /// Columns of the film.
+    pub width: u32,
+    /// Rows of the film.
+    pub height: u32,
+}
+
+impl Film {
+    /// A black film.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self { width, height, pixels: vec![[0.0; 3]; width as usize * height as usize] }
+    }
+
+    /// A film of these pixels, row by row from the top; `None` if they are not `width * height`.
+    pub fn from_pixels(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Option<Self> {
+        (pixels.len() as u64 == u64::from(width) * u64::from(height)).then_some(Self { width, height, pixels })
+    }
+
+    /// Columns.
+    pub fn width(&self) -> u32 {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.height
+    }
+
+    /// Linear RGB, row by row from the top.
+    pub fn pixels(&self) -> &[[f32; 3]] {
+        &self.pixels
+    }
+
+    /// Puts a part at its place, over what was there.
+    ///
+    /// # Errors
+    /// If the part does not fit on the film; nothing is changed then.
+    pub fn place(&mut self, part: &RenderedPart) -> Result<(), Misplaced> {
+        let Rect { x, y, width, height } = part.rect;
+        let inside =
+            x.checked_add(width).is_some_and(|right| right <= self.width) && y.checked_add(height).is_some_and(|low| low <= self.height);
+        if !inside || part.pixels.len() as u64 != part.rect.area() {
+            return Err(Misplaced { rect: part.rect, pixels: part.pixels.len(), width: self.width, height: self.height });
+        }
+        if part.pixels.is_empty() {
+            return Ok(());
+        }
+        let rows = self.pixels.chunks_exact_mut(self.width as usize).skip(y as usize);
+        for (row, part_row) in rows.zip(part.pixels.chunks_exact(width as usize)) {
+            row[x as usize..][..width as usize].copy_from_slice(part_row);
+        }
+        Ok(())
+    }
+
+    /// BLAKE3 of the pixels: little-endian f32, red, green, blue, row by row from the top.
+    pub fn hash(&self) -> [u8; 32] {
+        let bytes: Vec<u8> = self.pixels.iter().flatten().flat_map(|component| component.to_le_bytes()).collect();
+        *blake3::hash(&bytes).as_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::Counters;
+
+    /// A part whose pixels tell their own place.
+    fn part(x: u32, y: u32, width: u32, height: u32) -> RenderedPart {
+        let pixels = (0..height).flat_map(|row| (0..width).map(move |column| [(x + column) as f32, (y + row) as f32, 1.0])).collect();
+        RenderedPart { rect: Rect { x, y, width, height }, pixels, counters: Counters::default() }
+    }
+
+    #[test]
+    fn parts_come_to_their_place_in_any_order() {
+        let mut parts = [part(0, 0, 3, 2), part(3, 0, 4, 5), part(0, 2, 3, 3)];
+        let mut film = Film::new(7, 5);
+        parts.iter().for_each(|part| film.place(part).unwrap());
+        assert!(film.pixels().iter().enumerate().all(|(i, pixel)| *pixel == [(i % 7) as f32, (i / 7) as f32, 1.0]));
+        parts.reverse();
+        let mut other = Film::new(7, 5);
+        parts.iter().for_each(|part| other.place(part).unwrap());
+        assert_eq!(film.hash(), other.hash());
+        assert_ne!(film.hash(), Film::new(7, 5).hash());
+    }
+
+    #[test]
+    fn what_does_not_fit_changes_nothing() {
+        let mut film = Film::new(7, 5);
+        for misfit in [part(5, 0, 3, 1), part(0, 5, 1, 1), RenderedPart { pixels: vec![[1.0; 3]; 5], ..part(0, 0, 2, 2) }] {
+            assert_eq!(film.place(&misfit).unwrap_err().rect, misfit.rect);
+        }
+        film.place(&part(1, 1, 0, 2)).unwrap();
+        let beyond = RenderedPart { rect: Rect { x: u32::MAX, y: 0, width: 2, height: 1 }, ..part(0, 0, 2, 1) };
+        assert!(film.place(&beyond).is_err());
+        assert_eq!(film, Film::new(7, 5));
+    }
+}

@@ -1,0 +1,35 @@
+//! Integrators: how much light comes along a ray.
+
+mod direct;
+mod raycast;
+mod whitted;
+
+use glam::DVec3;
+
+pub use raycast::Raycast;
+pub use whitted::Whitted;
+
+use crate::{scene::Tracer, shape::Ray};
+
+/// A way to follow light. It may keep memory from ray to ray, but what it computes depends on scene and ray alone.
+pub trait Integrator {
+    /// Radiance that arrives along a ray from the camera.
+    fn radiance(&mut self, scene: impl Tracer, ray: &Ray) -> DVec3;
+
+    /// Rays traced so far, besides those from the camera.
+    fn counts(&self) -> RayCounts;
+}
+
+/// Rays that were traced.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayCounts {
+    /// Rays towards lights.
+    pub shadow: u64,
+    /// Reflected and refracted rays.
+    pub secondary: u64,
+}
+
+/// A colour of the description in the engine's own precision.
+fn rgb(color: [f32; 3]) -> DVec3 {
+    DVec3::new(color[0].into(), color[1].into(), color[2].into())
+}

@@ -1,0 +1,274 @@
+//! The picture: scene-linear OpenEXR.
+
+use std::{io, path::Path};
+
+use ::exr::{
+    block::{
+        self,
+        chunk::{Chunk, CompressedBlock, CompressedScanLineBlock},
+        writer::ChunksWriter,
+    },
+    error::Error,
+    image::{AnyChannels, FlatSamples, Image, Layer, read::read_first_flat_layer_from_file},
+    math::Vec2,
+    meta::{
+        BlockDescription,
+        attribute::{AttributeValue, ChannelDescription, Chromaticities, LineOrder, SampleType, Text},
+        header::{Header, LayerAttributes},
+    },
+    prelude::Compression,
+};
+use half::{f16, slice::HalfFloatSliceExt};
+use serde::{Deserialize, Serialize};
+
+use super::{OutputError, write_atomically, zip::Compressor};
+use crate::{REVISION, description::FrameHash, film::Film};
+
+/// How the file holds its numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PixelType {
+    /// 32-bit floats: the film's own.
+    Float,
+    /// 16-bit floats, rounded to nearest.
+    Half,
+}
+
+/// What a file says of itself, as JSON in its one text attribute `tessera`: what is pictured, not who rendered it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// The frame's hash in hexadecimal.
+    pub image_hash: String,
+    /// The frame's seed.
+    pub seed: u64,
+    /// The engine's revision.
+    pub engine_revision: u32,
+}
+
+impl Identity {
+    /// The identity of a frame that this engine rendered.
+    pub fn new(hash: FrameHash, seed: u64) -> Self {
+        Self { image_hash: hash.to_string(), seed, engine_revision: REVISION }
+    }
+}
+
+const ATTRIBUTE: &str = "tessera";
+
+/// The largest finite half float.
+const HALF_MAX: f32 = 65_504.0;
+
+/// Writes a film; equal films and identities give equal bytes. Returns how many numbers were too large for a half float and were clamped.
+///
+/// # Errors
+/// If the file cannot be written; an older one then stays as it was.
+pub fn write(path: &Path, film: &Film, pixel_type: PixelType, identity: &Identity) -> Result<u64, OutputError> {
+    let clamped = match pixel_type {
+        PixelType::Float => 0,
+        PixelType::Half => film.pixels().iter().flatten().filter(|&&number| number > HALF_MAX).count() as u64,
+    };
+    let header = header(film, pixel_type, identity);
+    write_atomically(path, |file| {
+        let chunks = |_, writer: &mut _| write_chunks(writer, film, pixel_type);
+        block::write(file, [header?].into_iter().collect(), true, chunks).map_err(io_error)
+    })?;
+    Ok(clamped)
+}
+
+/// Rows of one chunk of the compression ZIP16.
+const ROWS: usize = 16;
+
+/// Channels in the order of the file, which is that of their names, and where a pixel of the film holds them.
+const CHANNELS: [(&str, usize); 3] = [("B", 2), ("G", 1), ("R", 0)];
+
+fn header(film: &Film, pixel_type: PixelType, identity: &Identity) -> io::Result<Header> {
+    let sample_type = match pixel_type {
+        PixelType::Float => SampleType::F32,
+        PixelType::Half => SampleType::F16,
+    };
+    let channels = CHANNELS.map(|(name, _)| ChannelDescription::named(name, sample_type)).into_iter().collect();
+    let size = (film.width() as usize, film.height() as usize);
+    let mut header = Header::new(text(ATTRIBUTE)?, size, channels)
+        .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
+        .with_attributes(LayerAttributes::default());
+    header.shared_attributes.pixel_aspect = 1.0;
+    header.shared_attributes.chromaticities = Some(rec_709());
+    // One attribute and no more: the crate keeps them in a hash map, whose order would differ between runs.
+    let json = serde_json::to_string(identity)?;
+    header.shared_attributes.other.insert(text(ATTRIBUTE)?, AttributeValue::Text(text(&json)?));
+    Ok(header)
+}
+
+/// The crate would compress chunks by itself, but four times slower than [`Compressor`] for files that are not much smaller.
+fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelType) -> Result<(), Error> {
+    let (mut compressor, mut numbers, mut halves, mut bytes) = (Compressor::new(), Vec::new(), Vec::new(), Vec::new());
+    let chunks = film.pixels().chunks(ROWS * film.width() as usize);
+    for (index, (y_coordinate, rows)) in (0_i32..).step_by(ROWS).zip(chunks).enumerate() {
+        bytes.clear();
+        for row in rows.chunks(film.width() as usize) {
+            for (_, component) in CHANNELS {
+                numbers.clear();
+                numbers.extend(row.iter().map(|pixel| pixel[component]));
+                match pixel_type {
+                    PixelType::Float => bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes())),
+                    PixelType::Half => {
+                        round_to_halves(&mut numbers, &mut halves);
+                        bytes.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
+                    }
+                }
+            }
+        }
+        let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le: compressor.compress(&bytes) };
+        writer.write_chunk(index, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })?;
+    }
+    Ok(())
+}
+
+/// The nearest halves, ties to even; numbers beyond the largest half become it.
+fn round_to_halves(numbers: &mut [f32], halves: &mut Vec<f16>) {
+    numbers.iter_mut().for_each(|number| *number = number.min(HALF_MAX));
+    halves.resize(numbers.len(), f16::ZERO);
+    halves.convert_from_f32_slice(numbers);
+}
+
+/// Primaries and white of Rec. 709 (ITU-R BT.709-6, 1.3 and 1.4).
+fn rec_709() -> Chromaticities {
+    Chromaticities { red: Vec2(0.64, 0.33), green: Vec2(0.30, 0.60), blue: Vec2(0.15, 0.06), white: Vec2(0.3127, 0.3290) }
+}
+
+fn text(string: &str) -> io::Result<Text> {
+    Text::new_or_none(string).ok_or_else(|| io::Error::other("an attribute holds letters that EXR does not know"))
+}
+
+fn io_error(error: Error) -> io::Error {
+    match error {
+        Error::Io(error) => error,
+        other => io::Error::new(io::ErrorKind::InvalidData, other.to_string()),
+    }
+}
+
+/// A file that was read back.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Its pixels.
+    pub film: Film,
+    /// What it says of itself; `None` in files made elsewhere.
+    pub identity: Option<Identity>,
+}
+
+/// Reads the channels R, G and B of a file's first layer.
+///
+/// # Errors
+/// If the file cannot be read or has no such channels.
+pub fn read(path: &Path) -> Result<Picture, OutputError> {
+    read_picture(path).map_err(|reason| OutputError { path: path.to_owned(), doing: "read", reason })
+}
+
+fn read_picture(path: &Path) -> io::Result<Picture> {
+    let image = read_first_flat_layer_from_file(path).map_err(io_error)?;
+    let mut attributes = image.attributes.other.iter().chain(&image.layer_data.attributes.other);
+    let identity = match attributes.find(|(name, _)| Text::eq(name, ATTRIBUTE)) {
+        Some((_, AttributeValue::Text(json))) => Some(serde_json::from_str(&json.to_string())?),
+        _ => None,
+    };
+    Ok(Picture { film: film(&image)?, identity })
+}
+
+/// An image of one layer, as the crate reads it.
+type FlatImage = Image<Layer<AnyChannels<FlatSamples>>>;
+
+fn film(image: &FlatImage) -> io::Result<Film> {
+    let channels = &image.layer_data.channel_data.list;
+    let channel = |name: &str| {
+        let found = channels.iter().find(|channel| Text::eq(&channel.name, name) && channel.sampling == Vec2(1, 1));
+        let found = found.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, format!("it has no channel {name}")))?;
+        io::Result::Ok(found.sample_data.values_as_f32().collect::<Vec<f32>>())
+    };
+    let (red, green, blue) = (channel("R")?, channel("G")?, channel("B")?);
+    let pixels = red.iter().zip(&green).zip(&blue).map(|((&r, &g), &b)| [r, g, b]).collect();
+    let Vec2(width, height) = image.layer_data.size;
+    let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
+    size.and_then(|(width, height)| Film::from_pixels(width, height, pixels)).ok_or_else(|| io::Error::from(io::ErrorKind::InvalidData))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn identity() -> Identity {
+        Identity::new(FrameHash([0xab; 32]), u64::MAX)
+    }
+
+    fn film() -> Film {
+        let pixels = (0..37 * 21).map(|i| [i as f32 * 1e-3, 1.0 / (i + 1) as f32, if i % 5 == 0 { 1e30 } else { 0.25 }]).collect();
+        Film::from_pixels(37, 21, pixels).unwrap()
+    }
+
+    fn written(pixel_type: PixelType) -> (u64, Vec<u8>, Picture) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.exr");
+        let clamped = write(&path, &film(), pixel_type, &identity()).unwrap();
+        (clamped, fs::read(&path).unwrap(), read(&path).unwrap())
+    }
+
+    #[test]
+    fn floats_come_back_to_the_bit() {
+        let (clamped, _, picture) = written(PixelType::Float);
+        assert_eq!(clamped, 0);
+        assert!(picture.film == film(), "the pixels differ");
+        assert_eq!(picture.identity, Some(identity()));
+    }
+
+    /// Halves have 11 bits: the nearest lies within 2^-11 of the number.
+    #[test]
+    fn halves_are_rounded_and_clamped_and_the_clamped_are_counted() {
+        let (clamped, _, picture) = written(PixelType::Half);
+        assert_eq!(clamped, film().pixels().iter().filter(|pixel| pixel[2] > 1e29).count() as u64);
+        for (half, full) in picture.film.pixels().iter().flatten().zip(film().pixels().iter().flatten()) {
+            let full = full.min(65_504.0);
+            assert!((half - full).abs() <= full * 2.0_f32.powi(-11) + 1e-7, "{half} is not {full}");
+        }
+        assert!(picture.film.pixels().iter().flatten().any(|&number| number == 65_504.0));
+    }
+
+    /// What the format's own specification ("OpenEXR File Layout") says of the header, looked up in the bytes.
+    #[test]
+    fn the_header_says_what_others_need() {
+        let (_, bytes, _) = written(PixelType::Float);
+        let value = |name: &str, kind: &str| {
+            let key = [name.as_bytes(), b"\0", kind.as_bytes(), b"\0"].concat();
+            let at = bytes.windows(key.len()).position(|window| window == key).unwrap_or_else(|| panic!("no {name}")) + key.len();
+            let length = u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+            &bytes[at + 4..at + 4 + length]
+        };
+        let floats = |bytes: &[u8]| bytes.chunks(4).map(|four| f32::from_le_bytes(four.try_into().unwrap())).collect::<Vec<_>>();
+        assert_eq!(&bytes[..4], &[0x76, 0x2f, 0x31, 0x01]);
+        assert_eq!(value("compression", "compression"), [3], "ZIP of 16 lines");
+        assert_eq!(value("lineOrder", "lineOrder"), [0], "increasing");
+        assert_eq!(floats(value("pixelAspectRatio", "float")), [1.0]);
+        assert_eq!(floats(value("chromaticities", "chromaticities")), [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]);
+        let json: serde_json::Value = serde_json::from_slice(value("tessera", "string")).unwrap();
+        assert_eq!(json, serde_json::json!({"image_hash": "ab".repeat(32), "seed": u64::MAX, "engine_revision": REVISION}));
+    }
+
+    #[test]
+    fn equal_films_give_equal_bytes() {
+        let (_, bytes, _) = written(PixelType::Float);
+        for _ in 0..8 {
+            assert_eq!(written(PixelType::Float).1, bytes);
+        }
+    }
+
+    #[test]
+    fn a_broken_file_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("broken.exr");
+        fs::write(&path, b"no picture").unwrap();
+        let error = read(&path).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("cannot read {}: ", path.display())), "{error}");
+        write(&path, &film(), PixelType::Float, &identity()).unwrap();
+        let whole = fs::read(&path).unwrap();
+        fs::write(&path, &whole[..whole.len() / 2]).unwrap();
+        assert!(read(&path).is_err());
+    }
+}

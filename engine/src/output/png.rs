@@ -1,0 +1,105 @@
+//! The preview: 8-bit sRGB.
+//!
+//! Tone mapping: radiance is multiplied by `2^exposure` and clipped to [0, 1]; there is no curve, so that the preview shows the EXR's own colours.
+
+use std::{
+    io::{self, Write},
+    path::Path,
+};
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use super::{OutputError, write_atomically};
+use crate::film::Film;
+
+/// Writes a film as PNG; `exposure` is in stops.
+///
+/// # Errors
+/// If the file cannot be written; an older one then stays as it was.
+pub fn write(path: &Path, film: &Film, exposure: f64) -> Result<(), OutputError> {
+    let coded = encode(film, exposure);
+    write_atomically(path, |file| file.write_all(&coded?))
+}
+
+/// Where the chunks after `IHDR` begin: 8 bytes of signature, 25 of `IHDR`.
+const AFTER_HEADER: usize = 33;
+
+/// The chunk that says sRGB, perceptual intent: length, name, intent, checksum (PNG specification, 11.3.2.5).
+const SRGB_CHUNK: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
+
+fn encode(film: &Film, exposure: f64) -> io::Result<Vec<u8>> {
+    let scale = libm::exp2(exposure);
+    let quantizer = Quantizer::new();
+    let bytes: Vec<u8> = film.pixels().iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)).collect();
+    let mut coded = Vec::new();
+    PngEncoder::new(&mut coded).write_image(&bytes, film.width(), film.height(), ExtendedColorType::Rgb8).map_err(io::Error::other)?;
+    coded.splice(AFTER_HEADER..AFTER_HEADER, SRGB_CHUNK);
+    Ok(coded)
+}
+
+/// Rounds linear values to the nearest of the 256 sRGB codes.
+struct Quantizer {
+    /// The linear value half a code above each code.
+    bounds: [f64; 255],
+}
+
+impl Quantizer {
+    fn new() -> Self {
+        Self { bounds: std::array::from_fn(|code| srgb_to_linear((code as f64 + 0.5) / 255.0)) }
+    }
+
+    fn byte(&self, linear: f64) -> u8 {
+        self.bounds.partition_point(|&bound| bound <= linear) as u8
+    }
+}
+
+/// The electro-optical transfer function of IEC 61966-2-1.
+fn srgb_to_linear(code: f64) -> f64 {
+    if code <= 0.04045 { code / 12.92 } else { libm::pow((code + 0.055) / 1.055, 2.4) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::part::{Counters, Rect, RenderedPart};
+
+    fn film(pixels: &[[f32; 3]]) -> Film {
+        let rect = Rect { x: 0, y: 0, width: pixels.len() as u32, height: 1 };
+        let mut film = Film::new(rect.width, 1);
+        film.place(&RenderedPart { rect, pixels: pixels.to_vec(), counters: Counters::default() }).unwrap();
+        film
+    }
+
+    #[test]
+    fn colours_come_out_as_srgb_codes() {
+        // 0.5 -> 188 and 0.2140 -> 127.5 are textbook values of the curve; beyond 1 is clipped.
+        let coded = encode(&film(&[[0.0, 1.0, 7.0], [0.5, 0.25, 0.0031308]]), 0.0).unwrap();
+        let image = image::load_from_memory(&coded).unwrap().into_rgb8();
+        assert_eq!(image.as_raw(), &[0, 255, 255, 188, 137, 10]);
+        let darker = encode(&film(&[[0.0, 1.0, 7.0], [1.0, 0.5, 0.0062616]]), -1.0).unwrap();
+        assert_eq!(image::load_from_memory(&darker).unwrap().into_rgb8().as_raw(), &[0, 188, 255, 188, 137, 10]);
+    }
+
+    #[test]
+    fn every_code_survives() {
+        let quantizer = Quantizer::new();
+        for code in 0..=255_u8 {
+            assert_eq!(quantizer.byte(srgb_to_linear(f64::from(code) / 255.0)), code);
+        }
+    }
+
+    #[test]
+    fn the_file_says_that_it_is_srgb() {
+        let coded = encode(&film(&[[0.5; 3]]), 0.0).unwrap();
+        assert_eq!(&coded[12..16], b"IHDR");
+        assert_eq!(&coded[33..42], b"\0\0\0\x01sRGB\0");
+        assert_eq!(&coded[42..46], crc32(&coded[37..42]).to_be_bytes());
+        assert_eq!(&coded[50..54], b"IDAT");
+    }
+
+    /// The PNG specification's own checksum, bit by bit (annex D).
+    fn crc32(bytes: &[u8]) -> u32 {
+        let step = |crc: u32, _| if crc & 1 == 1 { 0xedb8_8320 ^ (crc >> 1) } else { crc >> 1 };
+        !bytes.iter().fold(u32::MAX, |crc, &byte| (0..8).fold(crc ^ u32::from(byte), step))
+    }
+}

@@ -1,0 +1,176 @@
+//! A small frame that every node renders before it is given work: equal hashes show that it computes the same bits as the others.
+
+use std::{io, sync::atomic::AtomicBool};
+
+use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+
+use super::{Rect, RenderedPart, SampleRange, render};
+use crate::{
+    description::{
+        Camera, ColorSpace, Falloff, Film, Filter, Frame, Group, Light, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind,
+        Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+    },
+    scene,
+};
+
+/// Why the canary cannot be rendered: a fault of the engine.
+#[derive(Debug, thiserror::Error)]
+#[error("the canary frame cannot be rendered: {0}")]
+pub struct CanaryError(String);
+
+/// The hash of a small part of the canary, for samples of this seed.
+///
+/// # Errors
+/// Only if the engine is at fault.
+pub fn canary_hash(seed: u64) -> Result<[u8; 32], CanaryError> {
+    let (frame, assets) = canary(seed)?;
+    let scene = scene::Scene::compile(&frame, &assets).map_err(fault)?;
+    let rect = Rect { x: 0, y: 0, width: frame.film.width, height: frame.film.height };
+    let samples = SampleRange { first: 0, count: frame.quality.samples.into() };
+    render(&scene, rect, samples, &AtomicBool::new(false)).map(|part: RenderedPart| part.hash()).map_err(fault)
+}
+
+fn fault(error: impl ToString) -> CanaryError {
+    CanaryError(error.to_string())
+}
+
+/// The frame: every shape, material, texture and light, and instances, made in code.
+///
+/// # Errors
+/// Only if the engine is at fault.
+pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
+    let mut assets = MemoryAssets::default();
+    let mesh = assets.insert(postcard::to_stdvec(&bumps()).map_err(fault)?);
+    let image = assets.insert(stripes().map_err(fault)?);
+    let mut scene = Scene { background: [0.3, 0.5, 0.8], lights: lights(), ..Scene::default() };
+    scene.textures = vec![
+        Texture::Checker { even: [0.9, 0.85, 0.8], odd: [0.1, 0.15, 0.2], size: 0.7 },
+        Texture::Image { file: image, color_space: ColorSpace::Srgb, wrap: [Wrap::Repeat, Wrap::Mirror], source: SourceId::default() },
+    ];
+    scene.materials = vec![
+        Material::Diffuse { reflectance: [0.9; 3], texture: Some(0) },
+        Material::Diffuse { reflectance: [0.8, 0.9, 1.0], texture: Some(1) },
+        Material::Mirror { reflectance: [0.9, 0.8, 0.7] },
+        Material::Glass { ior: 1.45, reflectance: [1.0; 3], transmittance: [0.95, 1.0, 0.95] },
+    ];
+    let cluster = Group {
+        objects: vec![
+            shape(Shape::Sphere { center: [0.0, 0.5, 0.0], radius: 0.5 }, 2, None),
+            shape(Shape::Sphere { center: [0.9, 0.4, 0.3], radius: 0.4 }, 3, None),
+            shape(Shape::Box { min: [-1.0, 0.0, -0.4], max: [-0.6, 0.9, 0.2] }, 1, Some(turned(0.6, 0.8, [0.1, 0.0, 0.2]))),
+            shape(Shape::Disc { center: [0.2, 1.3, -0.2], normal: [0.2, 1.0, 0.4], radius: 0.45 }, 2, None),
+        ],
+    };
+    let world = Group {
+        objects: vec![
+            shape(Shape::Plane { point: [0.0; 3], normal: [0.0, 1.0, 0.0] }, 0, None),
+            shape(Shape::Mesh { data: mesh }, 1, Some(turned(0.8, 0.6, [-0.2, 0.0, -2.2]))),
+            shape(
+                Shape::Sphere { center: [0.0; 3], radius: 1.0 },
+                1,
+                Some([[0.5, 0.1, 0.0, 1.8], [0.0, 0.4, 0.0, 0.5], [0.0, 0.2, 0.6, 1.0]]),
+            ),
+            instance(None),
+            instance(Some(turned(0.28, 0.96, [-2.1, 0.1, 0.4]))),
+        ],
+    };
+    scene.groups = vec![cluster, world];
+    scene.root = 1;
+    let frame = Frame {
+        scene,
+        camera: Camera::Perspective { eye: [0.4, 1.9, 5.2], look_at: [-0.2, 0.6, 0.0], up: [0.0, 1.0, 0.0], horizontal_fov: 48.0 },
+        film: Film { width: 64, height: 48, filter: Filter::Box },
+        render: Render::Whitted { max_depth: 6, transparent_shadows: true, min_weight: 0.0 },
+        quality: Quality { samples: 2 },
+        seed,
+    };
+    Ok((frame, assets))
+}
+
+fn shape(shape: Shape, material: u32, transform: Option<Matrix>) -> Object {
+    Object { kind: ObjectKind::Shape { shape, material }, transform, source: SourceId::default() }
+}
+
+fn instance(transform: Option<Matrix>) -> Object {
+    Object { kind: ObjectKind::Instance { group: 0 }, transform, source: SourceId::default() }
+}
+
+/// A turn about y, given by cosine and sine, and a shift.
+fn turned(cos: f64, sin: f64, [x, y, z]: [f64; 3]) -> Matrix {
+    [[cos, 0.0, sin, x], [0.0, 1.0, 0.0, y], [-sin, 0.0, cos, z]]
+}
+
+fn lights() -> Vec<Light> {
+    let source = SourceId::default();
+    vec![
+        Light::Point { position: [-3.0, 5.0, 4.0], intensity: [60.0, 55.0, 50.0], falloff: Falloff::InverseSquare, source },
+        Light::Point { position: [4.0, 3.0, 2.0], intensity: [0.2, 0.2, 0.3], falloff: Falloff::None, source },
+        Light::Directional { direction: [0.3, -1.0, -0.2], irradiance: [0.8, 0.8, 0.7], source },
+    ]
+}
+
+/// A wavy patch of 12 x 12 squares with smooth normals and texture coordinates.
+fn bumps() -> MeshData {
+    const SIDE: u32 = 12;
+    let vertices = (0..=SIDE).flat_map(|row| (0..=SIDE).map(move |column| (column as f32 / SIDE as f32, row as f32 / SIDE as f32)));
+    let mut mesh = MeshData::default();
+    for (u, v) in vertices {
+        // A saddle: x^2 - z^2 over [-1, 1]^2.
+        let (x, z) = (2.0 * u - 1.0, 2.0 * v - 1.0);
+        mesh.positions.push([1.8 * x, 1.1 + 0.6 * (x * x - z * z), z]);
+        let slope = glam::Vec3::new(-1.2 * x / 1.8, 1.0, 1.2 * z).normalize();
+        mesh.normals.push(slope.into());
+        mesh.uvs.push([3.0 * u, 3.0 * v]);
+    }
+    for row in 0..SIDE {
+        for column in 0..SIDE {
+            let corner = row * (SIDE + 1) + column;
+            let (below, right) = (corner + SIDE + 1, corner + 1);
+            mesh.triangles.extend([[corner, below, right], [right, below, below + 1]]);
+        }
+    }
+    mesh
+}
+
+/// A PNG of 8 x 8 pixels in stripes.
+fn stripes() -> Result<Vec<u8>, io::Error> {
+    let pixels: Vec<u8> = (0..64_u8).flat_map(|i| [40 + 3 * i, if i % 8 < 4 { 220 } else { 60 }, 255 - 3 * i]).collect();
+    let mut png = Vec::new();
+    PngEncoder::new(&mut png).write_image(&pixels, 8, 8, ExtendedColorType::Rgb8).map_err(io::Error::other)?;
+    Ok(png)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first node of a farm sets what the others must agree with, so this hash may change, but only together with [`crate::REVISION`].
+    #[test]
+    fn the_hash_is_that_of_this_revision() {
+        let hex: String = canary_hash(1).unwrap().iter().map(|byte| format!("{byte:02x}")).collect();
+        assert_eq!((crate::REVISION, hex.as_str()), (1, "ba8761be3e1d9dce976bdfdfb9f4d972aae0826b8f330e198a7da0745b1ed423"));
+    }
+
+    #[test]
+    fn another_seed_is_another_hash() {
+        assert_ne!(canary_hash(1).unwrap(), canary_hash(2).unwrap());
+    }
+
+    /// A canary that shows only sky would prove nothing: everything in it is met by rays.
+    #[test]
+    fn the_canary_does_all_kinds_of_work() {
+        let (frame, assets) = canary(1).unwrap();
+        let scene = scene::Scene::compile(&frame, &assets).unwrap();
+        let rect = Rect { x: 0, y: 0, width: frame.film.width, height: frame.film.height };
+        let met: std::collections::BTreeSet<u32> = (0..rect.area())
+            .filter_map(|i| {
+                let ray = scene.camera.ray((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5);
+                scene.closest(&ray).map(|surface| surface.material)
+            })
+            .collect();
+        assert_eq!(met.into_iter().collect::<Vec<_>>(), [0, 1, 2, 3]);
+        let part = render(&scene, rect, SampleRange { first: 0, count: 2 }, &AtomicBool::new(false)).unwrap();
+        assert_eq!(part.counters.invalid_samples, 0);
+        assert!(part.counters.secondary_rays > 1000 && part.counters.shadow_rays > 5000, "{:?}", part.counters);
+    }
+}

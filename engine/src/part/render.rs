@@ -1,0 +1,147 @@
+//! Rendering a part.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::DVec3;
+
+use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange};
+use crate::{
+    description::Render,
+    integrator::{Integrator, Raycast, Whitted},
+    sampling::film_point,
+    scene::{Scene, Tracer, Work},
+};
+
+/// Renders the samples of a range in every pixel of a rectangle. A pixel is the mean of its samples, summed by [`PairwiseSum`]. A sample that is
+/// invalid (a component is negative or no finite number) counts as black, so that it cannot spoil the pixel, and is counted.
+///
+/// The pixels depend on the scene, the rectangle and the range alone.
+///
+/// # Errors
+/// If `cancel` was set meanwhile; it is looked at once a row.
+pub fn render(scene: &Scene, rect: Rect, samples: SampleRange, cancel: &AtomicBool) -> Result<RenderedPart, Cancelled> {
+    let (pixels, counters) = trace(scene, Lattice { rect, stride: 1 }, samples, cancel)?;
+    Ok(RenderedPart { rect, pixels, counters })
+}
+
+/// Renders sample 0 of some pixels of a rectangle to learn how long the whole takes: those in the middle of squares of `stride` pixels, at least
+/// one. Returns their number; whoever calls it measures seconds.
+///
+/// # Errors
+/// If `cancel` was set meanwhile; it is looked at once a row.
+pub fn probe(scene: &Scene, cell: Rect, stride: u32, cancel: &AtomicBool) -> Result<u64, Cancelled> {
+    let (_, counters) = trace(scene, Lattice { rect: cell, stride }, SampleRange { first: 0, count: 1 }, cancel)?;
+    Ok(counters.camera_rays)
+}
+
+/// Pixels in the middle of squares of `stride` pixels of a rectangle.
+#[derive(Clone, Copy)]
+struct Lattice {
+    rect: Rect,
+    stride: u32,
+}
+
+impl Lattice {
+    fn columns(self) -> impl Iterator<Item = u32> {
+        middles(self.rect.x, self.rect.width, self.stride)
+    }
+
+    fn rows(self) -> impl Iterator<Item = u32> {
+        middles(self.rect.y, self.rect.height, self.stride)
+    }
+}
+
+/// The middles of the strides within `first..first + length`; the middle of all where a stride does not fit.
+fn middles(first: u32, length: u32, stride: u32) -> impl Iterator<Item = u32> {
+    let stride = stride.clamp(1, length.max(1));
+    (0..length / stride).map(move |step| first + step * stride + stride / 2)
+}
+
+type Pixels = (Vec<[f32; 3]>, Counters);
+
+fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicBool) -> Result<Pixels, Cancelled> {
+    match scene.render {
+        Render::Raycast => scene.run(Tracing::new(Raycast, lattice, samples, cancel)),
+        Render::Whitted { max_depth, transparent_shadows, min_weight } => {
+            scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
+        }
+    }
+}
+
+struct Tracing<'c, I> {
+    integrator: I,
+    lattice: Lattice,
+    samples: SampleRange,
+    /// Of one sample in the mean.
+    share: f64,
+    cancel: &'c AtomicBool,
+    sum: PairwiseSum,
+    counters: Counters,
+}
+
+impl<I: Integrator> Work for Tracing<'_, I> {
+    type Output = Result<Pixels, Cancelled>;
+
+    #[inline(always)]
+    fn run(mut self, scene: impl Tracer) -> Self::Output {
+        let mut pixels = Vec::with_capacity(self.lattice.rows().size_hint().0 * self.lattice.columns().size_hint().0);
+        for y in self.lattice.rows() {
+            if self.cancel.load(Ordering::Relaxed) {
+                return Err(Cancelled);
+            }
+            for x in self.lattice.columns() {
+                let pixel = self.pixel(scene, (x, y));
+                pixels.push(pixel);
+            }
+        }
+        let rays = self.integrator.counts();
+        Ok((pixels, Counters { shadow_rays: rays.shadow, secondary_rays: rays.secondary, ..self.counters }))
+    }
+}
+
+impl<'c, I: Integrator> Tracing<'c, I> {
+    fn new(integrator: I, lattice: Lattice, samples: SampleRange, cancel: &'c AtomicBool) -> Self {
+        let share = 1.0 / samples.count as f64;
+        Self { integrator, lattice, samples, share, cancel, sum: PairwiseSum::default(), counters: Counters::default() }
+    }
+
+    #[inline(always)]
+    fn pixel(&mut self, scene: impl Tracer, pixel: (u32, u32)) -> [f32; 3] {
+        self.sum.clear();
+        for index in self.samples.first..self.samples.first + self.samples.count {
+            let radiance = self.sample(scene, pixel, index);
+            self.sum.push(radiance);
+        }
+        let mean = self.sum.total() * self.share;
+        // Finite in f64, but perhaps not in f32.
+        mean.to_array().map(|component| component.min(f32::MAX.into()) as f32)
+    }
+
+    #[inline(always)]
+    fn sample(&mut self, scene: impl Tracer, pixel: (u32, u32), index: u64) -> DVec3 {
+        self.counters.camera_rays += 1;
+        let (x, y) = film_point(scene.film.filter, scene.seed, pixel, index);
+        let ray = scene.camera.ray(x, y);
+        let radiance = self.integrator.radiance(scene, &ray);
+        if radiance.is_finite() && radiance.min_element() >= 0.0 {
+            return radiance;
+        }
+        self.counters.invalid_samples += 1;
+        DVec3::ZERO
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lattice_takes_the_middle_of_every_stride() {
+        assert_eq!(middles(10, 48, 16).collect::<Vec<_>>(), [18, 34, 50]);
+        assert_eq!(middles(10, 50, 16).collect::<Vec<_>>(), [18, 34, 50]);
+        assert_eq!(middles(10, 5, 16).collect::<Vec<_>>(), [12], "a cell that is smaller than a stride is looked at nevertheless");
+        assert_eq!(middles(3, 4, 1).collect::<Vec<_>>(), [3, 4, 5, 6]);
+        assert_eq!(middles(3, 4, 0).count(), 4);
+        assert_eq!(middles(3, 0, 8).count(), 0);
+    }
+}

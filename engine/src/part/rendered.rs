@@ -1,0 +1,90 @@
+//! The finished pixels of a part, and their coding as bytes.
+
+use super::{Counters, Rect};
+
+/// Finished pixels of a rectangle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderedPart {
+    /// Where the pixels stand in the frame.
+    pub rect: Rect,
+    /// Linear RGB, row by row from the top, `rect.area()` pixels; finite and not negative.
+    pub pixels: Vec<[f32; 3]>,
+    /// The work that was done.
+    pub counters: Counters,
+}
+
+/// Bytes that are not the pixels of the rectangle that they are said to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{found} bytes of pixels where the rectangle has {expected}")]
+pub struct WrongLength {
+    /// Bytes that the rectangle's pixels take.
+    pub expected: u64,
+    /// Bytes that were there.
+    pub found: u64,
+}
+
+const BYTES_PER_PIXEL: usize = 12;
+
+impl RenderedPart {
+    /// The pixels as little-endian f32: red, green, blue, row by row.
+    pub fn to_bytes(&self) -> Vec<u8> {
+        self.pixels.iter().flatten().flat_map(|component| component.to_le_bytes()).collect()
+    }
+
+    /// The part whose pixels were coded by [`Self::to_bytes`].
+    ///
+    /// # Errors
+    /// If there are more or fewer bytes than `rect` has pixels for.
+    pub fn from_bytes(rect: Rect, counters: Counters, bytes: &[u8]) -> Result<Self, WrongLength> {
+        let expected = rect.area().saturating_mul(BYTES_PER_PIXEL as u64);
+        if bytes.len() as u64 != expected {
+            return Err(WrongLength { expected, found: bytes.len() as u64 });
+        }
+        let (components, _) = bytes.as_chunks::<4>();
+        let (pixels, _) = components.as_chunks::<3>();
+        Ok(Self { rect, pixels: pixels.iter().map(|pixel| pixel.map(f32::from_le_bytes)).collect(), counters })
+    }
+
+    /// BLAKE3 over the rectangle (x, y, width, height as little-endian u32) and the bytes of the pixels.
+    pub fn hash(&self) -> [u8; 32] {
+        let mut hasher = blake3::Hasher::new();
+        let Rect { x, y, width, height } = self.rect;
+        for number in [x, y, width, height] {
+            hasher.update(&number.to_le_bytes());
+        }
+        hasher.update(&self.to_bytes());
+        *hasher.finalize().as_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn part() -> RenderedPart {
+        let rect = Rect { x: 5, y: 7, width: 2, height: 3 };
+        RenderedPart { rect, pixels: (0..6_u8).map(|i| [f32::from(i), 0.1, 1e-30]).collect(), counters: Counters::default() }
+    }
+
+    #[test]
+    fn bytes_come_back_as_they_were() {
+        let part = part();
+        let bytes = part.to_bytes();
+        assert_eq!(&bytes[12..16], &1.0_f32.to_le_bytes());
+        assert_eq!(RenderedPart::from_bytes(part.rect, part.counters, &bytes).unwrap(), part);
+        let short = RenderedPart::from_bytes(part.rect, part.counters, &bytes[1..]).unwrap_err();
+        assert_eq!(short, WrongLength { expected: 72, found: 71 });
+    }
+
+    #[test]
+    fn the_hash_covers_place_and_pixels_but_not_the_work() {
+        let part = part();
+        let moved = RenderedPart { rect: Rect { x: 6, ..part.rect }, ..part.clone() };
+        let mut changed = part.clone();
+        changed.pixels[3][2] = 1.1e-30;
+        let busier = RenderedPart { counters: Counters { camera_rays: 9, ..Counters::default() }, ..part.clone() };
+        assert_ne!(part.hash(), moved.hash());
+        assert_ne!(part.hash(), changed.hash());
+        assert_eq!(part.hash(), busier.hash());
+    }
+}

@@ -1,0 +1,213 @@
+//! All shapes of a scene, in tables by kind, and the tree over them.
+
+use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4};
+
+use crate::{
+    accel::{LeafRule, MOST_LISTED_SPHERES, MeshHit, MeshTree, Pencil, Simd, SphereList, Tree},
+    light::Light,
+    math::{UNIT, max_abs},
+    shape::{Bounds, Cuboid, Disc, Plane, Sphere, triangle::geometric_normal},
+};
+
+/// A shape in world coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Placed<S> {
+    pub shape: S,
+    /// Place in the order of the scene: of equal distances, the lower wins.
+    pub object: u32,
+    pub material: u32,
+}
+
+/// An invertible affine map with what error bounds need.
+#[derive(Clone, Copy, Debug)]
+pub struct Transform {
+    pub to_world: DAffine3,
+    pub to_object: DAffine3,
+    /// Largest factor by which a vector's largest component grows on the way to the world, and back.
+    growth_to_world: f64,
+    growth_to_object: f64,
+}
+
+/// A finite shape under a map that does not leave it the same kind of shape.
+#[derive(Clone, Copy, Debug)]
+pub enum LocalShape {
+    Sphere(Sphere),
+    Cuboid(Cuboid),
+    Disc(Disc),
+}
+
+/// A transformed shape.
+#[derive(Clone, Copy, Debug)]
+pub struct Transformed {
+    pub shape: LocalShape,
+    pub transform: Transform,
+}
+
+/// A mesh at a place.
+#[derive(Clone, Copy, Debug)]
+pub struct Instance {
+    pub mesh: u32,
+    pub transform: Transform,
+    /// Whether hits must be asked if the surface is there: it has an alpha mask, or no back.
+    pub masked: bool,
+}
+
+/// Triangles, their tree, and what they carry.
+#[derive(Debug)]
+pub struct Mesh {
+    pub tree: MeshTree,
+    pub normals: Vec<[f32; 3]>,
+    pub uvs: Vec<[f32; 2]>,
+    pub colors: Vec<[f32; 4]>,
+}
+
+/// Which table a leaf of the top-level tree refers to; stands above the index in a reference.
+pub mod kind {
+    pub const SPHERE: u32 = 0;
+    pub const CUBOID: u32 = 1;
+    pub const DISC: u32 = 2;
+    pub const TRANSFORMED: u32 = 3;
+    pub const MESH: u32 = 4;
+    /// Planes stand outside the tree.
+    pub const PLANE: u32 = 5;
+    /// Bits of the index.
+    pub const SHIFT: u32 = 28;
+    pub const INDEX: u32 = (1 << SHIFT) - 1;
+}
+
+/// All shapes of a scene.
+#[derive(Debug)]
+pub struct Geometry {
+    pub planes: Vec<Placed<Plane>>,
+    pub spheres: Vec<Placed<Sphere>>,
+    pub cuboids: Vec<Placed<Cuboid>>,
+    pub discs: Vec<Placed<Disc>>,
+    pub transformed: Vec<Placed<Transformed>>,
+    pub instances: Vec<Placed<Instance>>,
+    pub meshes: Vec<Mesh>,
+    /// All spheres, where they are few: they stand outside the tree then.
+    pub list: Option<SphereList>,
+    /// Those spheres as the camera sees them.
+    pub from_eye: Option<Pencil>,
+    /// As each light sees those that may cast a shadow; `None` for a light without a place.
+    pub from_lights: Vec<Option<Pencil>>,
+    pub tree: Option<Tree>,
+    pub bounds: Option<Bounds>,
+    pub simd: Simd,
+}
+
+impl Geometry {
+    /// Builds the tree over all finite shapes, or all but a few spheres, and prepares those for rays from the eye and towards lights. `is_clear`
+    /// tells materials that cast no shadow.
+    pub fn finish(&mut self, eye: DVec3, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
+        self.spheres.sort_by_key(|sphere| is_clear(sphere.material));
+        let mut boxes = Vec::new();
+        let mut references = Vec::new();
+        let mut add = |kind: u32, bounds: &mut dyn Iterator<Item = Bounds>| {
+            for (index, bounds) in bounds.enumerate() {
+                boxes.push(bounds);
+                references.push(kind << kind::SHIFT | index as u32);
+            }
+        };
+        let spheres: Vec<Sphere> = self.spheres.iter().map(|s| s.shape).collect();
+        let few = !spheres.is_empty() && spheres.len() <= MOST_LISTED_SPHERES;
+        self.list = few.then(|| SphereList::new(&spheres));
+        self.from_eye = few.then(|| Pencil::new(eye, &spheres));
+        let blockers = &spheres[..self.spheres.partition_point(|sphere| !is_clear(sphere.material))];
+        self.from_lights = lights.iter().map(|light| light.position().filter(|_| few).map(|place| Pencil::new(place, blockers))).collect();
+        add(kind::SPHERE, &mut spheres.iter().filter(|_| !few).map(Sphere::bounds));
+        add(kind::CUBOID, &mut self.cuboids.iter().map(|s| s.shape.bounds()));
+        add(kind::DISC, &mut self.discs.iter().map(|s| s.shape.bounds()));
+        add(kind::TRANSFORMED, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
+        add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds(self.meshes[s.shape.mesh as usize].tree.bounds())));
+        let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
+        self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
+        self.tree =
+            (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |_, leaf| references[leaf[0] as usize]));
+    }
+}
+
+impl LocalShape {
+    fn bounds(&self) -> Bounds {
+        match self {
+            Self::Sphere(shape) => shape.bounds(),
+            Self::Cuboid(shape) => shape.bounds(),
+            Self::Disc(shape) => shape.bounds(),
+        }
+    }
+}
+
+impl Transform {
+    /// `None` if the map is not finite or cannot be inverted.
+    pub fn new(to_world: DAffine3) -> Option<Self> {
+        let to_object = to_world.inverse();
+        let growth = |m: DMat3| max_abs(m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs());
+        let (growth_to_world, growth_to_object) = (growth(to_world.matrix3), growth(to_object.matrix3));
+        let usable = to_world.is_finite() && to_object.is_finite() && growth_to_world > 0.0 && growth_to_object > 0.0;
+        usable.then_some(Self { to_world, to_object, growth_to_world, growth_to_object })
+    }
+
+    /// The box around the image of a box.
+    pub fn bounds(&self, bounds: Bounds) -> Bounds {
+        Bounds::of(bounds.corners().map(|corner| self.to_world.transform_point3(corner)))
+    }
+
+    /// A unit normal in the world (by the inverse transpose).
+    #[inline]
+    pub fn normal(&self, n: DVec3) -> DVec3 {
+        (self.to_object.matrix3.transpose() * n).normalize()
+    }
+
+    /// Bound on the error of a point in the world that is wrong by `error` in the object's coordinates, and on what the way back into these
+    /// coordinates adds when a ray starts there.
+    #[inline]
+    pub fn error(&self, error: f64, object: DVec3, world: DVec3) -> f64 {
+        let back = self.growth_to_object * max_abs(world) + max_abs(self.to_object.translation);
+        16.0 * UNIT * (max_abs(world) + max_abs(self.to_world.translation) + self.growth_to_world * (max_abs(object) + back))
+            + self.growth_to_world * error
+    }
+}
+
+/// A point of a mesh in the mesh's own coordinates.
+pub struct MeshPoint {
+    pub position: DVec3,
+    pub error: f64,
+    pub ng: DVec3,
+    /// Interpolated normal of any length; `ng` where there is none.
+    pub ns: DVec3,
+}
+
+impl Mesh {
+    /// The surface at a hit.
+    #[inline]
+    pub fn point(&self, hit: &MeshHit) -> MeshPoint {
+        let vertices = self.tree.vertices(hit.triangle);
+        let [a, b, c] = vertices;
+        let weights = [1.0 - hit.at.b1 - hit.at.b2, hit.at.b1, hit.at.b2];
+        let position = a * weights[0] + b * weights[1] + c * weights[2];
+        let size = max_abs(a).max(max_abs(b)).max(max_abs(c));
+        let ng = geometric_normal(vertices);
+        let ns = if self.normals.is_empty() { ng } else { self.interpolate(hit, |i| Vec3::from(self.normals[i]).as_dvec3()) };
+        MeshPoint { position, error: 16.0 * UNIT * size, ng, ns }
+    }
+
+    /// Texture coordinates at a hit; 0 where there are none.
+    pub fn uv(&self, hit: &MeshHit) -> DVec2 {
+        if self.uvs.is_empty() { DVec2::ZERO } else { self.interpolate(hit, |i| Vec2::from(self.uvs[i]).as_dvec2()) }
+    }
+
+    /// Colour and opacity at a hit; 1 where there are none.
+    pub fn color(&self, hit: &MeshHit) -> [f32; 4] {
+        if self.colors.is_empty() { [1.0; 4] } else { self.interpolate(hit, |i| Vec4::from(self.colors[i]).as_dvec4()).as_vec4().into() }
+    }
+
+    fn interpolate<V: std::ops::Add<Output = V> + std::ops::Mul<f64, Output = V>>(&self, hit: &MeshHit, at: impl Fn(usize) -> V) -> V {
+        let [a, b, c] = self.tree.indices(hit.triangle);
+        at(a) * (1.0 - hit.at.b1 - hit.at.b2) + at(b) * hit.at.b1 + at(c) * hit.at.b2
+    }
+
+    /// Memory in bytes.
+    pub fn bytes(&self) -> usize {
+        self.tree.bytes() + size_of_val(&*self.normals) + size_of_val(&*self.uvs) + size_of_val(&*self.colors)
+    }
+}

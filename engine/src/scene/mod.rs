@@ -1,0 +1,64 @@
+//! The compiled scene: all that a frame's rays need, immutable and shared by all threads.
+
+mod compile;
+mod error;
+mod geometry;
+mod place;
+mod query;
+mod statistics;
+mod surface;
+mod tracer;
+#[cfg(test)]
+mod tests;
+
+pub use error::{CompileError, Warning};
+pub use statistics::Statistics;
+pub use surface::{Crossing, Surface};
+pub use tracer::{Tracer, Work};
+
+use glam::DVec3;
+
+use crate::{
+    camera::Camera,
+    description::{Film, Quality, Render, Rgb},
+    light::Light,
+    material::Material,
+    shape::Bounds,
+    texture::Texture,
+};
+use geometry::Geometry;
+
+/// A compiled frame.
+#[derive(Debug)]
+pub struct Scene {
+    /// From where it is seen.
+    pub camera: Camera,
+    /// All lights.
+    pub lights: Vec<Light>,
+    /// All materials: those of the description, then those of its models.
+    pub materials: Vec<Material>,
+    /// All textures: those of the description, then those of its models.
+    pub textures: Vec<Texture>,
+    /// Radiance of rays that leave the scene.
+    pub background: Rgb,
+    /// What the frame is gathered on.
+    pub film: Film,
+    /// How light is followed.
+    pub render: Render,
+    /// How accurately.
+    pub quality: Quality,
+    /// Chooses the sample pattern.
+    pub seed: u64,
+    /// What a user should know, each once.
+    pub warnings: Vec<Warning>,
+    /// What the scene is made of.
+    pub statistics: Statistics,
+    geometry: Geometry,
+}
+
+impl Scene {
+    /// Lowest and highest coordinates of all finite things.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.geometry.bounds.map(|Bounds { min, max }| (min, max))
+    }
+}

@@ -1,0 +1,340 @@
+//! Objects at their places in the world: groups unfolded, transforms applied, meshes and models read once each.
+
+use std::{collections::BTreeMap, rc::Rc};
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use super::{
+    error::{CompileError, Warning},
+    geometry::{Geometry, Instance, LocalShape, Mesh, Placed, Transform, Transformed, kind},
+};
+use crate::{
+    accel::{MeshTree, Simd},
+    assets,
+    description::{self, AssetId, AssetSource, GroupId, MaterialId, Matrix, MeshData, Model, Object, ObjectKind, Shape, SourceId},
+    light::Light,
+    material::Material,
+    math::max_abs,
+    shape::{Cuboid, Disc, Plane, Sphere},
+    texture::Texture,
+};
+
+type Result<T> = std::result::Result<T, CompileError>;
+
+/// Deepest nesting of groups.
+const DEEPEST: usize = 64;
+
+/// A model that has been read: its meshes, and where its materials begin.
+struct PlacedModel {
+    /// Index of each of its meshes in the geometry; `None` where it has no triangles.
+    meshes: Vec<Option<u32>>,
+    /// Index in the scene of each mesh's material.
+    materials: Vec<u32>,
+    instances: Vec<assets::Instance>,
+}
+
+/// Fills a scene's tables.
+pub struct Placer<'a> {
+    scene: &'a description::Scene,
+    assets: &'a dyn AssetSource,
+    script_meshes: BTreeMap<AssetId, u32>,
+    models: Vec<(&'a Model, Rc<PlacedModel>)>,
+    objects: u32,
+    /// The tables.
+    pub materials: Vec<Material>,
+    /// See `materials`.
+    pub textures: Vec<Texture>,
+    /// See `materials`.
+    pub geometry: Geometry,
+    /// What a user should know.
+    pub warnings: Vec<Warning>,
+}
+
+impl<'a> Placer<'a> {
+    /// Begins with the description's own materials and textures.
+    pub fn new(scene: &'a description::Scene, assets: &'a dyn AssetSource, materials: Vec<Material>, textures: Vec<Texture>) -> Self {
+        let geometry = Geometry {
+            planes: Vec::new(),
+            spheres: Vec::new(),
+            cuboids: Vec::new(),
+            discs: Vec::new(),
+            transformed: Vec::new(),
+            instances: Vec::new(),
+            meshes: Vec::new(),
+            list: None,
+            from_eye: None,
+            from_lights: Vec::new(),
+            tree: None,
+            bounds: None,
+            simd: Simd::detect(),
+        };
+        Self {
+            scene,
+            assets,
+            script_meshes: BTreeMap::new(),
+            models: Vec::new(),
+            objects: 0,
+            materials,
+            textures,
+            geometry,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// Places the world and builds its tree; `casts_no_shadow` tells materials that let all light through.
+    pub fn place(mut self, eye: DVec3, lights: &[Light], casts_no_shadow: impl Fn(&Material) -> bool) -> Result<Self> {
+        if self.scene.root as usize >= self.scene.groups.len() {
+            return Err(CompileError::new(SourceId::default(), "the scene has no root group"));
+        }
+        self.group(self.scene.root, DAffine3::IDENTITY, 0)?;
+        self.geometry.finish(eye, lights, |material| casts_no_shadow(&self.materials[material as usize]));
+        Ok(self)
+    }
+
+    fn group(&mut self, group: GroupId, place: DAffine3, depth: usize) -> Result<()> {
+        let scene = self.scene;
+        for object in &scene.groups[group as usize].objects {
+            let to_world = match &object.transform {
+                Some(matrix) => place * affine(matrix),
+                None => place,
+            };
+            let transform = Transform::new(to_world).ok_or_else(|| not_invertible(object))?;
+            self.object(group, object, transform, depth)?;
+        }
+        Ok(())
+    }
+
+    fn object(&mut self, group: GroupId, object: &'a Object, transform: Transform, depth: usize) -> Result<()> {
+        match &object.kind {
+            ObjectKind::Shape { shape, material } => {
+                self.check_material(*material, object.source)?;
+                self.shape(shape, *material, transform, object.source)
+            }
+            ObjectKind::Model { model, material } => {
+                if let Some(material) = material {
+                    self.check_material(*material, object.source)?;
+                }
+                self.model(model, *material, transform, object.source)
+            }
+            ObjectKind::Instance { group: inner } => {
+                if *inner >= group {
+                    return Err(CompileError::new(object.source, "an instance shows a group that does not stand before its own"));
+                }
+                if depth == DEEPEST {
+                    return Err(CompileError::new(object.source, format!("groups are nested more than {DEEPEST} deep")));
+                }
+                self.group(*inner, transform.to_world, depth + 1)
+            }
+        }
+    }
+
+    fn check_material(&self, material: MaterialId, source: SourceId) -> Result<()> {
+        let known = (material as usize) < self.scene.materials.len();
+        if known { Ok(()) } else { Err(CompileError::new(source, format!("material {material} does not exist"))) }
+    }
+
+    fn shape(&mut self, shape: &Shape, material: MaterialId, transform: Transform, source: SourceId) -> Result<()> {
+        let wrong = |message: &str| Err(CompileError::new(source, message));
+        match *shape {
+            Shape::Sphere { center, radius } => {
+                let center = finite(center, "the sphere's center", source)?;
+                if !(radius > 0.0 && radius.is_finite()) {
+                    return wrong(&format!("the sphere's radius must be above 0, not {radius}"));
+                }
+                self.solid(LocalShape::Sphere(Sphere { center, radius }), material, transform, source)
+            }
+            Shape::Plane { point, normal } => {
+                let point = finite(point, "the plane's point", source)?;
+                let plane = Plane::new(point, unit(normal, "the plane's normal", source)?);
+                let object = self.next_object(source)?;
+                let shape = if transform.to_world == DAffine3::IDENTITY {
+                    plane
+                } else {
+                    plane.transformed(&transform.to_world, &transform.to_object)
+                };
+                self.geometry.planes.push(Placed { shape, object, material });
+                Ok(())
+            }
+            Shape::Box { min, max } => {
+                let (min, max) = (finite(min, "the box's min", source)?, finite(max, "the box's max", source)?);
+                if !min.cmplt(max).all() {
+                    return wrong("the box's max must be above its min in every coordinate");
+                }
+                self.solid(LocalShape::Cuboid(Cuboid { min, max }), material, transform, source)
+            }
+            Shape::Disc { center, normal, radius } => {
+                let center = finite(center, "the disc's center", source)?;
+                let normal = unit(normal, "the disc's normal", source)?;
+                if !(radius > 0.0 && radius.is_finite()) {
+                    return wrong(&format!("the disc's radius must be above 0, not {radius}"));
+                }
+                self.solid(LocalShape::Disc(Disc { center, normal, radius }), material, transform, source)
+            }
+            Shape::Mesh { data } => {
+                let mesh = match self.script_meshes.get(&data) {
+                    Some(mesh) => *mesh,
+                    None => {
+                        let mesh = self.read_mesh(data, source)?;
+                        self.script_meshes.insert(data, mesh);
+                        mesh
+                    }
+                };
+                self.instance(mesh, material, transform, source)
+            }
+        }
+    }
+
+    /// A finite shape: moved and scaled evenly it stays what it is, else it keeps its transform.
+    fn solid(&mut self, shape: LocalShape, material: u32, transform: Transform, source: SourceId) -> Result<()> {
+        let object = self.next_object(source)?;
+        let DAffine3 { matrix3, translation } = transform.to_world;
+        let scale = matrix3.x_axis.x;
+        let geometry = &mut self.geometry;
+        if !(scale > 0.0 && matrix3 == DMat3::from_diagonal(DVec3::splat(scale))) {
+            geometry.transformed.push(Placed { shape: Transformed { shape, transform }, object, material });
+            return Ok(());
+        }
+        let moved = |p: DVec3| p * scale + translation;
+        match shape {
+            LocalShape::Sphere(Sphere { center, radius }) => {
+                geometry.spheres.push(Placed { shape: Sphere { center: moved(center), radius: radius * scale }, object, material });
+            }
+            LocalShape::Cuboid(Cuboid { min, max }) => {
+                geometry.cuboids.push(Placed { shape: Cuboid { min: moved(min), max: moved(max) }, object, material });
+            }
+            LocalShape::Disc(Disc { center, normal, radius }) => {
+                geometry.discs.push(Placed { shape: Disc { center: moved(center), normal, radius: radius * scale }, object, material });
+            }
+        }
+        Ok(())
+    }
+
+    fn instance(&mut self, mesh: u32, material: u32, transform: Transform, source: SourceId) -> Result<()> {
+        let object = self.next_object(source)?;
+        let surface = &self.materials[material as usize];
+        let masked = surface.is_masked() || !surface.double_sided;
+        self.geometry.instances.push(Placed { shape: Instance { mesh, transform, masked }, object, material });
+        Ok(())
+    }
+
+    fn model(&mut self, model: &'a Model, material: Option<MaterialId>, transform: Transform, source: SourceId) -> Result<()> {
+        let known = self.models.iter().find(|(known, _)| *known == model).map(|(_, placed)| Rc::clone(placed));
+        let placed = match known {
+            Some(placed) => placed,
+            None => {
+                let placed = Rc::new(self.read_model(model, source)?);
+                self.models.push((model, Rc::clone(&placed)));
+                placed
+            }
+        };
+        for instance in &placed.instances {
+            let Some(mesh) = placed.meshes[instance.mesh] else { continue };
+            let Some(transform) = Transform::new(transform.to_world * instance.transform) else {
+                let message = "a part of the model is scaled to nothing and left out".into();
+                self.warn(source, message);
+                continue;
+            };
+            let material = material.unwrap_or(placed.materials[instance.mesh]);
+            self.instance(mesh, material, transform, source)?;
+        }
+        Ok(())
+    }
+
+    fn read_model(&mut self, model: &Model, source: SourceId) -> Result<PlacedModel> {
+        let loaded = assets::load(model, self.assets).map_err(|error| CompileError::asset(source, error))?;
+        let (first_material, first_texture) = (self.materials.len() as u32, self.textures.len() as u32);
+        self.materials.extend(loaded.materials.iter().map(|material| Material::from_model(material, first_texture)));
+        self.textures.extend(loaded.textures);
+        for message in loaded.warnings {
+            self.warn(source, message);
+        }
+        let materials = loaded.meshes.iter().map(|mesh| first_material + mesh.material as u32).collect();
+        let mut meshes = Vec::with_capacity(loaded.meshes.len());
+        for mesh in loaded.meshes {
+            let assets::Mesh { positions, triangles, normals, uvs, colors, .. } = mesh;
+            meshes.push((!triangles.is_empty()).then(|| self.add_mesh(positions, triangles, normals, uvs, colors)));
+        }
+        Ok(PlacedModel { meshes, materials, instances: loaded.instances })
+    }
+
+    fn read_mesh(&mut self, id: AssetId, source: SourceId) -> Result<u32> {
+        let wrong = |message: String| CompileError::new(source, message);
+        let bytes = self.assets.bytes(id).ok_or_else(|| wrong(format!("the mesh's data ({id}) is not here")))?;
+        let data: MeshData = postcard::from_bytes(&bytes).map_err(|error| wrong(format!("the mesh's data is damaged: {error}")))?;
+        check_mesh(&data).map_err(wrong)?;
+        let MeshData { positions, triangles, normals, uvs } = data;
+        Ok(self.add_mesh(positions, triangles, normals, uvs, Vec::new()))
+    }
+
+    fn add_mesh(
+        &mut self,
+        positions: Vec<[f32; 3]>,
+        triangles: Vec<[u32; 3]>,
+        normals: Vec<[f32; 3]>,
+        uvs: Vec<[f32; 2]>,
+        colors: Vec<[f32; 4]>,
+    ) -> u32 {
+        self.geometry.meshes.push(Mesh { tree: MeshTree::build(positions, triangles), normals, uvs, colors });
+        self.geometry.meshes.len() as u32 - 1
+    }
+
+    fn next_object(&mut self, source: SourceId) -> Result<u32> {
+        if self.objects == kind::INDEX {
+            let error = CompileError::new(source, format!("the scene has more than {} objects once its groups are unfolded", kind::INDEX));
+            return Err(error.with_help("join objects that never move apart into one mesh"));
+        }
+        self.objects += 1;
+        Ok(self.objects - 1)
+    }
+
+    fn warn(&mut self, source: SourceId, message: String) {
+        let warning = Warning { source, message };
+        if !self.warnings.contains(&warning) {
+            self.warnings.push(warning);
+        }
+    }
+}
+
+fn affine(rows: &Matrix) -> DAffine3 {
+    let [x, y, z] = rows;
+    let columns = DMat3::from_cols(DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]), DVec3::new(x[2], y[2], z[2]));
+    DAffine3::from_mat3_translation(columns, DVec3::new(x[3], y[3], z[3]))
+}
+
+fn not_invertible(object: &Object) -> CompileError {
+    let finite = object.transform.is_none_or(|rows| rows.iter().flatten().all(|x| x.is_finite()));
+    let what =
+        if finite { "the object's transform cannot be inverted: it flattens the object" } else { "the object's transform is not finite" };
+    CompileError::new(object.source, what).with_help("check for a scale of 0, or for a division by 0")
+}
+
+fn finite(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
+    let v = DVec3::from(v);
+    if v.is_finite() { Ok(v) } else { Err(CompileError::new(source, format!("{what} is not finite"))) }
+}
+
+/// A vector that has a direction, made a unit vector.
+fn unit(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
+    let v = finite(v, what, source)?;
+    let size = max_abs(v);
+    if size > 0.0 { Ok((v / size).normalize()) } else { Err(CompileError::new(source, format!("{what} is 0"))) }
+}
+
+fn check_mesh(data: &MeshData) -> std::result::Result<(), String> {
+    let vertices = data.positions.len();
+    if data.triangles.is_empty() {
+        return Err("the mesh has no triangles".into());
+    }
+    if let Some(at) = data.positions.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        return Err(format!("position {} of the mesh is not finite", at + 1));
+    }
+    if let Some(at) = data.triangles.iter().position(|t| t.iter().any(|i| *i as usize >= vertices)) {
+        return Err(format!("triangle {} of the mesh names a vertex beyond the {vertices} that there are", at + 1));
+    }
+    for (name, count) in [("normals", data.normals.len()), ("uvs", data.uvs.len())] {
+        if count != 0 && count != vertices {
+            return Err(format!("the mesh has {count} {name} for {vertices} vertices"));
+        }
+    }
+    Ok(())
+}

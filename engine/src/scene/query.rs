@@ -1,0 +1,441 @@
+//! Rays against the scene.
+
+use std::ops::ControlFlow;
+
+use glam::DVec2;
+
+use super::{
+    Scene,
+    geometry::{Instance, LocalShape, Placed, kind},
+    surface::{Crossing, Surface},
+    tracer::{Tracer, Work},
+};
+#[cfg(target_arch = "x86_64")]
+use crate::accel::Avx2;
+use crate::{
+    accel::{Baseline, Lanes, MeshHit, Pencil, Simd},
+    shape::{Point, Ray, Sphere, triangle::TriangleHit},
+};
+
+/// The nearest hit so far.
+#[derive(Clone, Copy)]
+pub(super) struct Hit {
+    t: f64,
+    object: u32,
+    /// Triangle of a mesh, face of a box.
+    part: u32,
+    /// Kind and index of the shape.
+    reference: u32,
+    /// Barycentric coordinates on a triangle.
+    b1: f64,
+    b2: f64,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Hit {
+    /// Takes over a hit that is nearer, or as near and of an earlier object.
+    #[inline(always)]
+    fn offer(&mut self, hit: Hit) {
+        if hit.t < self.t || (hit.t == self.t && (hit.object, hit.part) < (self.object, self.part)) {
+            *self = hit;
+        }
+    }
+}
+
+/// Queries of one mesh as functions of their own, so that scenes without meshes do not pay for them in registers.
+pub(super) trait Outlined: Lanes {
+    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
+    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool;
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Outlined for Avx2 {
+    #[inline(always)]
+    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
+        #[target_feature(enable = "avx2,bmi1")]
+        #[inline(never)]
+        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
+            // SAFETY: this function enables the instructions.
+            unsafe { scene.closest_of_mesh_in::<Avx2>(ray, reference, best) }
+        }
+        // SAFETY: the caller has the instructions.
+        unsafe { outlined(scene, ray, reference, best) }
+    }
+
+    #[inline(always)]
+    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+        #[target_feature(enable = "avx2,bmi1")]
+        #[inline(never)]
+        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+            // SAFETY: this function enables the instructions.
+            unsafe { scene.any_of_mesh_in::<Avx2>(ray, reference, blocked) }
+        }
+        // SAFETY: the caller has the instructions.
+        unsafe { outlined(scene, ray, reference, blocked) }
+    }
+}
+
+impl Outlined for Baseline {
+    #[inline(never)]
+    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
+        // SAFETY: every machine has these instructions.
+        unsafe { scene.closest_of_mesh_in::<Baseline>(ray, reference, best) }
+    }
+
+    #[inline(never)]
+    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+        // SAFETY: every machine has these instructions.
+        unsafe { scene.any_of_mesh_in::<Baseline>(ray, reference, blocked) }
+    }
+}
+
+impl Scene {
+    /// The nearest surface that a ray of unit direction meets. Whoever traces many rays does it in [`Scene::run`].
+    pub fn closest(&self, ray: &Ray) -> Option<Surface> {
+        struct Closest<'r>(&'r Ray);
+        impl Work for Closest<'_> {
+            type Output = Option<Surface>;
+
+            #[inline(always)]
+            fn run(self, scene: impl Tracer) -> Option<Surface> {
+                scene.closest(self.0)
+            }
+        }
+        self.run(Closest(ray))
+    }
+
+    /// Whether anything stands in the way of a ray of unit direction: asks `blocks`, with the material, of every surface that it crosses before
+    /// `t_max`, in no particular order, until one does. A closed shape is crossed twice. Whoever traces many rays does it in [`Scene::run`].
+    pub fn any(&self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        struct Any<'r, F>(&'r Ray, F);
+        impl<F: FnMut(u32, &Crossing) -> bool> Work for Any<'_, F> {
+            type Output = bool;
+
+            #[inline(always)]
+            fn run(self, scene: impl Tracer) -> bool {
+                scene.any(self.0, self.1)
+            }
+        }
+        self.run(Any(ray, blocks))
+    }
+
+    pub(super) fn simd(&self) -> Simd {
+        self.geometry.simd
+    }
+
+    /// One function for all who ask, so that everything in it is inlined where its instructions are enabled.
+    ///
+    /// # Safety
+    /// The processor has AVX2 and BMI1.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1")]
+    pub(super) unsafe fn closest_avx2(&self, ray: &Ray) -> Hit {
+        // SAFETY: this function enables the instructions.
+        unsafe { self.closest_in::<Avx2>(ray, None) }
+    }
+
+    /// See [`Self::closest_avx2`].
+    ///
+    /// # Safety
+    /// The processor has AVX2 and BMI1.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1")]
+    pub(super) unsafe fn closest_from_eye_avx2(&self, ray: &Ray) -> Hit {
+        // SAFETY: this function enables the instructions.
+        unsafe { self.closest_in::<Avx2>(ray, self.geometry.from_eye.as_ref()) }
+    }
+
+    /// # Safety
+    /// The processor has AVX2 and BMI1.
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,bmi1")]
+    pub(super) unsafe fn any_avx2(&self, ray: &Ray, light: Option<usize>, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        // SAFETY: this function enables the instructions.
+        unsafe { self.any_in::<Avx2>(ray, light, blocks) }
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn closest_in<L: Outlined>(&self, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
+        let geometry = &self.geometry;
+        // A hit at `t_max` is none: no object is below 0.
+        let mut best = Hit { t: ray.t_max, object: 0, part: 0, reference: NONE, b1: 0.0, b2: 0.0 };
+        for (index, plane) in geometry.planes.iter().enumerate() {
+            if let Some(t) = plane.shape.closest(ray) {
+                best.offer(Hit {
+                    t,
+                    object: plane.object,
+                    part: 0,
+                    reference: kind::PLANE << kind::SHIFT | index as u32,
+                    b1: 0.0,
+                    b2: 0.0,
+                });
+            }
+        }
+        if let Some(list) = &geometry.list {
+            let candidates = match pencil {
+                // SAFETY: the caller has the instructions of `L`.
+                Some(pencil) => unsafe { pencil.along::<L>(ray.direction, best.t) },
+                // SAFETY: the caller has the instructions of `L`.
+                None => unsafe { list.candidates::<L>(ray, best.t) },
+            };
+            for index in candidates {
+                let sphere = &geometry.spheres[index];
+                if let Some(t) = sphere.shape.closest::<true>(ray) {
+                    let reference = kind::SPHERE << kind::SHIFT | index as u32;
+                    best.offer(Hit { t, object: sphere.object, part: 0, reference, b1: 0.0, b2: 0.0 });
+                }
+            }
+        }
+        let Some(tree) = &geometry.tree else { return best };
+        let boxed = tree.ray::<true>(ray.origin, ray.direction);
+        let limit = boxed.limit(best.t);
+        let leaf = |reference: u32| {
+            let index = (reference & kind::INDEX) as usize;
+            let simple = |t: f64, object: u32, part: u32| Hit { t, object, part, reference, b1: 0.0, b2: 0.0 };
+            match reference >> kind::SHIFT {
+                kind::SPHERE => {
+                    let sphere = &geometry.spheres[index];
+                    if let Some(t) = sphere.shape.closest::<true>(ray) {
+                        best.offer(simple(t, sphere.object, 0));
+                    }
+                }
+                kind::CUBOID => {
+                    let cuboid = &geometry.cuboids[index];
+                    if let Some((t, face)) = cuboid.shape.closest(ray) {
+                        best.offer(simple(t, cuboid.object, face));
+                    }
+                }
+                kind::DISC => {
+                    let disc = &geometry.discs[index];
+                    if let Some(t) = disc.shape.closest(ray) {
+                        best.offer(simple(t, disc.object, 0));
+                    }
+                }
+                kind::TRANSFORMED => {
+                    let placed = &geometry.transformed[index];
+                    let local = ray.transformed(&placed.shape.transform.to_object);
+                    let hit = match &placed.shape.shape {
+                        LocalShape::Sphere(sphere) => sphere.closest::<false>(&local).map(|t| (t, 0)),
+                        LocalShape::Cuboid(cuboid) => cuboid.closest(&local),
+                        LocalShape::Disc(disc) => disc.closest(&local).map(|t| (t, 0)),
+                    };
+                    if let Some((t, part)) = hit {
+                        best.offer(simple(t, placed.object, part));
+                    }
+                }
+                _ => {
+                    // SAFETY: the caller has the instructions of `L`.
+                    unsafe { L::closest_of_mesh(self, ray, reference, &mut best) }
+                }
+            }
+            ControlFlow::Continue(boxed.limit(best.t))
+        };
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { tree.visit::<L, false>(&boxed, limit, leaf) };
+        best
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn any_in<L: Outlined>(
+        &self,
+        ray: &Ray,
+        light: Option<usize>,
+        mut blocks: impl FnMut(u32, &Crossing) -> bool,
+    ) -> bool {
+        let geometry = &self.geometry;
+        let mut blocked = |material: u32, t: f64| t > 0.0 && t < ray.t_max && blocks(material, &Crossing { t });
+        if geometry.planes.iter().any(|plane| plane.shape.closest(ray).is_some_and(|t| blocked(plane.material, t))) {
+            return true;
+        }
+        if let Some(list) = &geometry.list {
+            let candidates = match light.and_then(|light| geometry.from_lights[light].as_ref()) {
+                // SAFETY: the caller has the instructions of `L`.
+                Some(pencil) => unsafe { pencil.before::<L>(ray.origin) }.without(ray.leaves),
+                // SAFETY: the caller has the instructions of `L`.
+                None => unsafe { list.candidates::<L>(ray, ray.t_max) },
+            };
+            for index in candidates {
+                let sphere = &geometry.spheres[index];
+                let crossings = sphere.shape.crossings::<true>(ray.origin, ray.direction);
+                if crossings.is_some_and(|[near, far]| blocked(sphere.material, near) || blocked(sphere.material, far)) {
+                    return true;
+                }
+            }
+        }
+        let Some(tree) = &geometry.tree else { return false };
+        let boxed = tree.ray::<true>(ray.origin, ray.direction);
+        let limit = boxed.limit(ray.t_max);
+        let mut found = false;
+        let leaf = |reference: u32| {
+            let index = (reference & kind::INDEX) as usize;
+            found = match reference >> kind::SHIFT {
+                kind::SPHERE => {
+                    let sphere = &geometry.spheres[index];
+                    let crossings = sphere.shape.crossings::<true>(ray.origin, ray.direction);
+                    crossings.is_some_and(|[near, far]| blocked(sphere.material, near) || blocked(sphere.material, far))
+                }
+                kind::CUBOID => {
+                    let cuboid = &geometry.cuboids[index];
+                    let crossings = cuboid.shape.crossings(ray.origin, ray.direction);
+                    crossings.is_some_and(|[near, far]| blocked(cuboid.material, near.0) || blocked(cuboid.material, far.0))
+                }
+                kind::DISC => {
+                    let disc = &geometry.discs[index];
+                    disc.shape.closest(ray).is_some_and(|t| blocked(disc.material, t))
+                }
+                kind::TRANSFORMED => {
+                    let placed = &geometry.transformed[index];
+                    let local = ray.transformed(&placed.shape.transform.to_object);
+                    let crossings = match &placed.shape.shape {
+                        LocalShape::Sphere(sphere) => sphere.crossings::<false>(local.origin, local.direction),
+                        LocalShape::Cuboid(cuboid) => cuboid.crossings(local.origin, local.direction).map(|[near, far]| [near.0, far.0]),
+                        LocalShape::Disc(disc) => disc.closest(&local).map(|t| [t, f64::INFINITY]),
+                    };
+                    crossings.is_some_and(|[near, far]| blocked(placed.material, near) || blocked(placed.material, far))
+                }
+                _ => {
+                    // SAFETY: the caller has the instructions of `L`.
+                    unsafe { L::any_of_mesh(self, ray, reference, &mut blocked) }
+                }
+            };
+            if found { ControlFlow::Break(()) } else { ControlFlow::Continue(limit) }
+        };
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { tree.visit::<L, true>(&boxed, limit, leaf) };
+        found
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn closest_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, best: &mut Hit) {
+        let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
+        let local = Ray { t_max: best.t, ..ray.transformed(&placed.shape.transform.to_object) };
+        let visit = |hit: MeshHit| {
+            if !placed.shape.masked || self.is_there(placed, &hit) {
+                best.offer(Hit { t: hit.at.t, object: placed.object, part: hit.triangle, reference, b1: hit.at.b1, b2: hit.at.b2 });
+            }
+            ControlFlow::Continue(best.t)
+        };
+        // SAFETY: the caller has the instructions of `L`.
+        let _: ControlFlow<()> = unsafe { self.geometry.meshes[placed.shape.mesh as usize].tree.hits::<L, false>(&local, visit) };
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn any_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+        let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
+        let local = ray.transformed(&placed.shape.transform.to_object);
+        let visit = |hit: MeshHit| {
+            let there = !placed.shape.masked || self.is_there(placed, &hit);
+            if there && blocked(placed.material, hit.at.t) { ControlFlow::Break(()) } else { ControlFlow::Continue(ray.t_max) }
+        };
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { self.geometry.meshes[placed.shape.mesh as usize].tree.hits::<L, true>(&local, visit) }.is_break()
+    }
+
+    /// Whether a mesh has a surface at a hit: not cut away by its alpha mask, nor seen from a back that it does not have.
+    #[cold]
+    fn is_there(&self, placed: &Placed<Instance>, hit: &MeshHit) -> bool {
+        let material = &self.materials[placed.material as usize];
+        if !material.double_sided && !hit.at.front {
+            return false;
+        }
+        let Some(cutoff) = material.alpha_cutoff else { return true };
+        let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
+        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].rgba(mesh.uv(hit))[3]);
+        material.base_alpha * texture * mesh.color(hit)[3] >= cutoff
+    }
+
+    /// The surface at a hit. All of it is inlined, so that no surface is handed over in memory: that would take longer than computing it.
+    #[inline(always)]
+    pub(super) fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
+        if hit.reference == NONE {
+            return None;
+        }
+        let geometry = &self.geometry;
+        let index = (hit.reference & kind::INDEX) as usize;
+        Some(match hit.reference >> kind::SHIFT {
+            kind::SPHERE => {
+                let sphere = &geometry.spheres[index];
+                let bit = if geometry.list.is_some() { 1 << index } else { 0 };
+                let mut point = sphere.shape.point(ray, hit.t);
+                self.add_sphere_uv(&mut point, sphere.material);
+                Surface { sphere: bit, ..in_world(point, hit.t, sphere.material) }
+            }
+            kind::CUBOID => {
+                let cuboid = &geometry.cuboids[index];
+                in_world(cuboid.shape.point(ray, hit.t, hit.part), hit.t, cuboid.material)
+            }
+            kind::DISC => {
+                let disc = &geometry.discs[index];
+                in_world(disc.shape.point(ray, hit.t), hit.t, disc.material)
+            }
+            kind::PLANE => {
+                let plane = &geometry.planes[index];
+                in_world(plane.shape.point(ray, hit.t), hit.t, plane.material)
+            }
+            kind::TRANSFORMED => self.transformed_surface(ray, hit, index),
+            _ => self.mesh_surface(hit, index),
+        })
+    }
+
+    #[inline(always)]
+    fn transformed_surface(&self, ray: &Ray, hit: &Hit, index: usize) -> Surface {
+        let placed = &self.geometry.transformed[index];
+        let transform = &placed.shape.transform;
+        let local = ray.transformed(&transform.to_object);
+        let mut point = match &placed.shape.shape {
+            LocalShape::Sphere(sphere) => sphere.point(&local, hit.t),
+            LocalShape::Cuboid(cuboid) => cuboid.point(&local, hit.t, hit.part),
+            LocalShape::Disc(disc) => disc.point(&local, hit.t),
+        };
+        if matches!(placed.shape.shape, LocalShape::Sphere(_)) {
+            self.add_sphere_uv(&mut point, placed.material);
+        }
+        let position = transform.to_world.transform_point3(point.position);
+        let error = transform.error(point.error, point.position, position);
+        in_world(Point { position, error, normal: transform.normal(point.normal), uv: point.uv }, hit.t, placed.material)
+    }
+
+    #[inline(always)]
+    fn mesh_surface(&self, hit: &Hit, index: usize) -> Surface {
+        let placed = &self.geometry.instances[index];
+        let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
+        let at = MeshHit { triangle: hit.part, at: TriangleHit { t: hit.t, b1: hit.b1, b2: hit.b2, front: true } };
+        let local = mesh.point(&at);
+        let transform = &placed.shape.transform;
+        let point = transform.to_world.transform_point3(local.position);
+        let ng = transform.normal(local.ng);
+        let ns = if mesh.normals.is_empty() { ng } else { transform.normal(local.ns) };
+        let ns = match ns.dot(ng) {
+            above if above > 0.0 => ns,
+            below if below < 0.0 => -ns,
+            // Perpendicular, zero or NaN.
+            _ => ng,
+        };
+        let uv = if self.materials[placed.material as usize].texture().is_some() { mesh.uv(&at) } else { DVec2::ZERO };
+        let error = transform.error(local.error, local.position, point);
+        Surface { point, t: hit.t, error, ng, ns, uv, color: mesh.color(&at), material: placed.material, sphere: 0 }
+    }
+
+    /// Longitude and latitude cost more than the hit itself: only textures ask for them.
+    #[inline(always)]
+    fn add_sphere_uv(&self, point: &mut Point, material: u32) {
+        if self.materials[material as usize].texture().is_some() {
+            point.uv = Sphere::uv(point.normal);
+        }
+    }
+}
+
+#[inline(always)]
+fn in_world(point: Point, t: f64, material: u32) -> Surface {
+    let Point { position, error, normal, uv } = point;
+    Surface { point: position, t, error, ng: normal, ns: normal, uv, color: [1.0; 4], material, sphere: 0 }
+}

@@ -1,0 +1,46 @@
+//! What a scene is made of, in numbers.
+
+use super::geometry::{Geometry, LocalShape};
+
+/// Counts of a compiled scene.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Statistics {
+    /// Spheres, transformed ones included.
+    pub spheres: usize,
+    /// Planes.
+    pub planes: usize,
+    /// Boxes, transformed ones included.
+    pub boxes: usize,
+    /// Discs, transformed ones included.
+    pub discs: usize,
+    /// Different meshes.
+    pub meshes: usize,
+    /// Appearances of meshes.
+    pub instances: usize,
+    /// Triangles of the different meshes.
+    pub triangles: usize,
+    /// Triangles of all appearances.
+    pub instanced_triangles: usize,
+    /// Memory of meshes and trees in bytes.
+    pub bytes: usize,
+}
+
+impl Statistics {
+    pub(super) fn of(geometry: &Geometry) -> Self {
+        let transformed = |is: fn(&LocalShape) -> bool| geometry.transformed.iter().filter(|placed| is(&placed.shape.shape)).count();
+        let triangles = |mesh: u32| geometry.meshes[mesh as usize].tree.count();
+        Self {
+            spheres: geometry.spheres.len() + transformed(|shape| matches!(shape, LocalShape::Sphere(_))),
+            planes: geometry.planes.len(),
+            boxes: geometry.cuboids.len() + transformed(|shape| matches!(shape, LocalShape::Cuboid(_))),
+            discs: geometry.discs.len() + transformed(|shape| matches!(shape, LocalShape::Disc(_))),
+            meshes: geometry.meshes.len(),
+            instances: geometry.instances.len(),
+            triangles: geometry.meshes.iter().map(|mesh| mesh.tree.count()).sum(),
+            instanced_triangles: geometry.instances.iter().map(|placed| triangles(placed.shape.mesh)).sum(),
+            bytes: geometry.meshes.iter().map(|mesh| mesh.bytes()).sum::<usize>()
+                + geometry.tree.as_ref().map_or(0, |tree| tree.bytes())
+                + geometry.list.as_ref().map_or(0, |list| list.bytes()),
+        }
+    }
+}

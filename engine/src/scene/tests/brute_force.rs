@@ -1,0 +1,143 @@
+//! The tree against every object in turn.
+
+use super::*;
+use crate::{
+    accel::Simd,
+    scene::geometry::{Geometry, LocalShape},
+    shape::triangle::Sheared,
+};
+
+/// Distance of the nearest hit and number of its object, by the exact intersections alone.
+fn nearest(geometry: &Geometry, ray: &Ray) -> Option<(f64, u32)> {
+    let mut hits: Vec<(f64, u32)> = Vec::new();
+    hits.extend(geometry.planes.iter().filter_map(|p| Some((p.shape.closest(ray)?, p.object))));
+    hits.extend(geometry.spheres.iter().filter_map(|p| Some((p.shape.closest::<true>(ray)?, p.object))));
+    hits.extend(geometry.cuboids.iter().filter_map(|p| Some((p.shape.closest(ray)?.0, p.object))));
+    hits.extend(geometry.discs.iter().filter_map(|p| Some((p.shape.closest(ray)?, p.object))));
+    hits.extend(geometry.transformed.iter().filter_map(|p| {
+        let local = ray.transformed(&p.shape.transform.to_object);
+        let t = match &p.shape.shape {
+            LocalShape::Sphere(sphere) => sphere.closest::<false>(&local)?,
+            LocalShape::Cuboid(cuboid) => cuboid.closest(&local)?.0,
+            LocalShape::Disc(disc) => disc.closest(&local)?,
+        };
+        Some((t, p.object))
+    }));
+    for p in &geometry.instances {
+        let local = ray.transformed(&p.shape.transform.to_object);
+        let (sheared, mesh) = (Sheared::new(local.origin, local.direction), &geometry.meshes[p.shape.mesh as usize].tree);
+        let of_triangle = |triangle| Some((sheared.hit(mesh.vertices(triangle))?.t, p.object));
+        hits.extend((0..mesh.count() as u32).filter_map(of_triangle).filter(|(t, _)| *t < ray.t_max));
+    }
+    hits.into_iter().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
+}
+
+/// The scene's own answer, with the number of the object found again by its distance.
+fn found(scene: &Scene, ray: &Ray) -> Option<u64> {
+    scene.closest(ray).map(|surface| surface.t.to_bits())
+}
+
+fn check(scene: &mut Scene, rays: &[Ray]) {
+    for ray in rays {
+        let expected = nearest(&scene.geometry, ray);
+        let bits = expected.map(|(t, _)| t.to_bits());
+        for simd in [Simd::Baseline, Simd::detect()] {
+            scene.geometry.simd = simd;
+            assert_eq!(found(scene, ray), bits, "{simd:?} {ray:?}");
+            assert_eq!(scene.any(ray, |_, _| true), bits.is_some(), "{simd:?} {ray:?}");
+            if let Some((t, _)) = expected {
+                let short = Ray { t_max: t, ..*ray };
+                assert_eq!(found(scene, &short), None, "nothing lies before the nearest hit: {simd:?} {ray:?}");
+                assert!(!scene.any(&short, |_, _| true), "{simd:?} {ray:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn spheres_on_a_floor_are_hit_as_without_a_tree() {
+    let mut scene = compile(spheres_on_a_floor());
+    let rays = rays_of(&scene, 50_000);
+    check(&mut scene, &rays);
+}
+
+#[test]
+fn all_shapes_and_instances_are_hit_as_without_a_tree() {
+    for seed in 0..4 {
+        let mut scene = everything(seed, 60).compile();
+        let rays = rays_of(&scene, 5_000);
+        check(&mut scene, &rays);
+    }
+}
+
+/// Directions with zeros of both signs, and rays that lie in the planes of boxes and of flat meshes.
+#[test]
+fn rays_along_the_axes_are_hit_as_without_a_tree() {
+    let mut maker = everything(9, 30);
+    let square = MeshData {
+        positions: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Default::default()
+    };
+    maker.mesh(&square, DAffine3::IDENTITY);
+    maker.add(Shape::Box { min: [0.0; 3], max: [1.0; 3] }, DAffine3::IDENTITY);
+    let mut scene = maker.compile();
+    let (mut random, mut rays) = (Random(3), Vec::new());
+    let grid = |random: &mut Random| f64::from(random.bits() % 9) * 0.5 - 2.0;
+    for _ in 0..3_000 {
+        let origin = DVec3::new(grid(&mut random), grid(&mut random), grid(&mut random));
+        let axis = random.bits() as usize % 3;
+        let mut direction = DVec3::splat(if random.bits() % 2 == 0 { 0.0 } else { -0.0 });
+        direction[axis] = if random.bits() % 2 == 0 { 1.0 } else { -1.0 };
+        if random.bits() % 2 == 0 {
+            direction[(axis + 1) % 3] = 1.0;
+        }
+        rays.push(Ray::new(origin, direction.normalize()));
+    }
+    check(&mut scene, &rays);
+}
+
+/// From a thousand to 10^12 scene sizes away.
+#[test]
+fn distant_rays_are_hit_as_without_a_tree() {
+    let mut scene = everything(13, 60).compile();
+    let mut random = Random(13);
+    let mut rays = Vec::new();
+    for exponent in [3, 6, 9, 12] {
+        for _ in 0..1_000 {
+            let target = random.point() * 4.0;
+            let origin = target + random.direction() * crate::math::pow(10.0, f64::from(exponent));
+            rays.push(Ray::new(origin, (target - origin).normalize()));
+        }
+    }
+    check(&mut scene, &rays);
+}
+
+/// Every bit of every surface is the same with either vector width.
+#[test]
+fn vector_widths_give_the_same_bits() {
+    let mut scene = everything(5, 200).compile();
+    let rays = rays_of(&scene, 20_000);
+    let mut surfaces = |simd| {
+        scene.geometry.simd = simd;
+        rays.iter().map(|ray| scene.closest(ray)).collect::<Vec<_>>()
+    };
+    assert_eq!(surfaces(Simd::Baseline), surfaces(Simd::detect()));
+}
+
+#[test]
+fn crossings_come_each_once() {
+    let scene = compile(vec![
+        shape(Shape::Plane { point: [0.0, -1.0, 0.0], normal: [0.0, 1.0, 0.0] }, 0),
+        sphere(DVec3::new(0.0, 3.0, 0.0), 1.0, 1),
+        shape(Shape::Box { min: [-1.0, 5.0, -1.0], max: [1.0, 6.0, 1.0] }, 2),
+        shape(Shape::Disc { center: [0.0, 8.0, 0.0], normal: [0.0, 1.0, 0.1], radius: 1.0 }, 0),
+    ]);
+    let mut seen = Vec::new();
+    assert!(!scene.any(&Ray::new(DVec3::new(0.1, 10.0, 0.1), -DVec3::Y), |material, crossing| {
+        seen.push((crossing.t, material));
+        false
+    }));
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    assert_eq!(seen.iter().map(|(_, material)| *material).collect::<Vec<_>>(), [0, 2, 2, 1, 1, 0]);
+}

@@ -1,0 +1,102 @@
+//! What cannot be compiled names its object.
+
+use super::*;
+use crate::scene::CompileError;
+
+const HERE: SourceId = SourceId(42);
+
+fn error_of(object: Object) -> CompileError {
+    let object = Object { source: HERE, ..object };
+    Scene::compile(&frame(vec![sphere(DVec3::ZERO, 1.0, 0), object]), &MemoryAssets::default()).unwrap_err()
+}
+
+fn message_of(object: Object) -> String {
+    let error = error_of(object);
+    assert_eq!(error.source, HERE, "{error}");
+    error.message
+}
+
+fn placed(rows: Matrix) -> Object {
+    Object { transform: Some(rows), ..sphere(DVec3::ZERO, 1.0, 0) }
+}
+
+#[test]
+fn transforms_that_flatten_or_are_not_numbers_name_the_object() {
+    let flat = message_of(placed([[1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]));
+    assert_eq!(flat, "the object's transform cannot be inverted: it flattens the object");
+    let nan = message_of(placed([[1.0, 0.0, 0.0, f64::NAN], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]]));
+    assert_eq!(nan, "the object's transform is not finite");
+    assert!(error_of(placed([[0.0; 4]; 3])).help.is_some());
+}
+
+#[test]
+fn impossible_shapes_name_the_object() {
+    assert_eq!(message_of(sphere(DVec3::ZERO, 0.0, 0)), "the sphere's radius must be above 0, not 0");
+    assert_eq!(message_of(sphere(DVec3::ZERO, f64::NAN, 0)), "the sphere's radius must be above 0, not NaN");
+    assert_eq!(message_of(sphere(DVec3::new(0.0, f64::INFINITY, 0.0), 1.0, 0)), "the sphere's center is not finite");
+    assert_eq!(message_of(shape(Shape::Plane { point: [0.0; 3], normal: [0.0; 3] }, 0)), "the plane's normal is 0");
+    assert_eq!(
+        message_of(shape(Shape::Box { min: [0.0; 3], max: [1.0, 0.0, 1.0] }, 0)),
+        "the box's max must be above its min in every coordinate"
+    );
+    assert_eq!(
+        message_of(shape(Shape::Disc { center: [0.0; 3], normal: [0.0, 1.0, 0.0], radius: -1.0 }, 0)),
+        "the disc's radius must be above 0, not -1"
+    );
+    assert_eq!(message_of(sphere(DVec3::ZERO, 1.0, 17)), "material 17 does not exist");
+}
+
+#[test]
+fn missing_damaged_and_wrong_meshes_name_the_object() {
+    let compile_mesh = |bytes: Vec<u8>| {
+        let mut assets = MemoryAssets::default();
+        let data = assets.insert(bytes);
+        let object = Object { source: HERE, ..shape(Shape::Mesh { data }, 0) };
+        let error = Scene::compile(&frame(vec![object]), &assets).unwrap_err();
+        assert_eq!(error.source, HERE);
+        error.message
+    };
+    let coded = |mesh: &MeshData| postcard::to_stdvec(mesh).unwrap();
+    let good = ball(4, 4, 0.0);
+    let mut bytes = coded(&good);
+    bytes.truncate(20);
+    assert!(compile_mesh(bytes).starts_with("the mesh's data is damaged"));
+    let mut beyond = good.clone();
+    beyond.triangles[3][1] = 99;
+    assert_eq!(compile_mesh(coded(&beyond)), "triangle 4 of the mesh names a vertex beyond the 14 that there are");
+    let mut nan = good.clone();
+    nan.positions[2][0] = f32::NAN;
+    assert_eq!(compile_mesh(coded(&nan)), "position 3 of the mesh is not finite");
+    let few = MeshData { normals: vec![[0.0, 1.0, 0.0]], ..good };
+    assert_eq!(compile_mesh(coded(&few)), "the mesh has 1 normals for 14 vertices");
+    assert_eq!(compile_mesh(coded(&MeshData::default())), "the mesh has no triangles");
+    let absent = message_of(shape(Shape::Mesh { data: crate::description::AssetId([7; 32]) }, 0));
+    assert!(absent.starts_with("the mesh's data (0707"), "{absent}");
+}
+
+#[test]
+fn groups_that_show_themselves_are_refused() {
+    let cycle = Object { kind: ObjectKind::Instance { group: 0 }, ..sphere(DVec3::ZERO, 1.0, 0) };
+    assert_eq!(message_of(cycle), "an instance shows a group that does not stand before its own");
+}
+
+#[test]
+fn films_and_cameras_are_checked() {
+    let mut empty = frame(vec![]);
+    empty.film.width = 0;
+    let error = Scene::compile(&empty, &MemoryAssets::default()).unwrap_err();
+    assert_eq!(error.message, "the film is 0 x 768 pixels; each side must be 1 to 65536");
+    let mut blind = frame(vec![]);
+    blind.camera = Camera::Perspective { eye: [0.0; 3], look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov: 40.0 };
+    let error = Scene::compile(&blind, &MemoryAssets::default()).unwrap_err();
+    assert_eq!(error.message, "the camera's look_at must differ from its eye");
+}
+
+#[test]
+fn an_empty_scene_is_a_scene() {
+    let scene = compile(vec![]);
+    let ray = scene.camera.ray(512.0, 384.0);
+    assert_eq!(scene.closest(&ray), None);
+    assert!(!scene.any(&ray, |_, _| true));
+    assert_eq!(scene.bounds(), None);
+}

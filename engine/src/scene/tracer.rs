@@ -1,0 +1,147 @@
+//! Tracing many rays in code that is compiled for the processor at hand.
+
+use std::{marker::PhantomData, ops::Deref};
+
+#[cfg(target_arch = "x86_64")]
+use crate::accel::Avx2;
+use crate::{
+    accel::{Baseline, Simd},
+    shape::Ray,
+};
+
+use super::{Crossing, Scene, Surface};
+
+/// A scene and its queries, in code for one kind of processor: what [`Scene::run`] gives to its work. All kinds give the same bits.
+pub trait Tracer: Copy + Deref<Target = Scene> {
+    /// See [`Scene::closest`].
+    fn closest(self, ray: &Ray) -> Option<Surface>;
+
+    /// The same for a ray that starts at the camera's eye.
+    fn closest_from_eye(self, ray: &Ray) -> Option<Surface>;
+
+    /// See [`Scene::any`].
+    fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
+
+    /// The same for a ray that ends at a light of [`Scene::lights`], or goes towards it without end. `blocks` need not be asked of surfaces that let
+    /// all light through.
+    fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
+}
+
+/// Work that traces many rays. Its functions are compiled once for each kind of processor, as far as they are inlined.
+pub trait Work {
+    /// What comes out.
+    type Output;
+
+    /// Does the work. Mark it `#[inline(always)]`.
+    fn run(self, scene: impl Tracer) -> Self::Output;
+}
+
+impl Scene {
+    /// Does work in code for this processor: the choice is made once, not for every ray.
+    pub fn run<W: Work>(&self, work: W) -> W::Output {
+        match self.simd() {
+            #[cfg(target_arch = "x86_64")]
+            // SAFETY: `Simd::detect` found these instructions.
+            Simd::Avx2 => unsafe { run_avx2(self, work) },
+            // SAFETY: every machine has these instructions.
+            _ => work.run(unsafe { View::<Baseline>::new(self) }),
+        }
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,bmi1")]
+unsafe fn run_avx2<W: Work>(scene: &Scene, work: W) -> W::Output {
+    // SAFETY: this function enables the instructions, and its caller found that the processor has them.
+    work.run(unsafe { View::<Avx2>::new(scene) })
+}
+
+/// A scene for processors that have the instructions of `L`: a value of this type is the proof.
+struct View<'s, L> {
+    scene: &'s Scene,
+    lanes: PhantomData<L>,
+}
+
+impl<'s, L> View<'s, L> {
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn new(scene: &'s Scene) -> Self {
+        Self { scene, lanes: PhantomData }
+    }
+}
+
+impl<L> Clone for View<'_, L> {
+    #[inline(always)]
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<L> Copy for View<'_, L> {}
+
+impl<L> Deref for View<'_, L> {
+    type Target = Scene;
+
+    #[inline(always)]
+    fn deref(&self) -> &Scene {
+        self.scene
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+impl Tracer for View<'_, Avx2> {
+    #[inline(always)]
+    fn closest(self, ray: &Ray) -> Option<Surface> {
+        // SAFETY: `self` is the proof.
+        let hit = unsafe { self.scene.closest_avx2(ray) };
+        self.scene.surface(ray, &hit)
+    }
+
+    #[inline(always)]
+    fn closest_from_eye(self, ray: &Ray) -> Option<Surface> {
+        // SAFETY: `self` is the proof.
+        let hit = unsafe { self.scene.closest_from_eye_avx2(ray) };
+        self.scene.surface(ray, &hit)
+    }
+
+    #[inline(always)]
+    fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.any_avx2(ray, None, blocks) }
+    }
+
+    #[inline(always)]
+    fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.any_avx2(ray, Some(light), blocks) }
+    }
+}
+
+impl Tracer for View<'_, Baseline> {
+    #[inline(always)]
+    fn closest(self, ray: &Ray) -> Option<Surface> {
+        // SAFETY: `self` is the proof.
+        let hit = unsafe { self.scene.closest_in::<Baseline>(ray, None) };
+        self.scene.surface(ray, &hit)
+    }
+
+    #[inline(always)]
+    fn closest_from_eye(self, ray: &Ray) -> Option<Surface> {
+        // SAFETY: `self` is the proof.
+        let hit = unsafe { self.scene.closest_in::<Baseline>(ray, self.scene.geometry.from_eye.as_ref()) };
+        self.scene.surface(ray, &hit)
+    }
+
+    #[inline(always)]
+    fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.any_in::<Baseline>(ray, None, blocks) }
+    }
+
+    #[inline(always)]
+    fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.any_in::<Baseline>(ray, Some(light), blocks) }
+    }
+}

@@ -1,0 +1,87 @@
+//! Textures, compiled: a colour for every uv.
+
+mod image;
+mod srgb;
+mod wrap;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+pub use self::{image::Image, srgb::srgb_to_linear};
+
+use crate::description::{self, AssetError, AssetSource, Rgb, Wrap};
+
+/// A texture that is ready to be looked up. Clones share the image.
+#[derive(Clone, Debug)]
+pub enum Texture {
+    /// Squares of two colours.
+    Checker {
+        /// Colour where `floor(u / size) + floor(v / size)` is even.
+        even: Rgb,
+        /// Colour elsewhere.
+        odd: Rgb,
+        /// Edge of a square.
+        size: f64,
+    },
+    /// An image, bilinearly interpolated in linear light.
+    Image {
+        /// Its pixels.
+        image: Arc<Image>,
+        /// What lies beyond u in [0, 1] and v in [0, 1].
+        wrap: [Wrap; 2],
+    },
+}
+
+impl Texture {
+    /// Decodes the texture's image, where it has one.
+    ///
+    /// # Errors
+    /// The image is missing or cannot be decoded: names the kind of file and the reason.
+    pub fn compile(texture: &description::Texture, assets: &dyn AssetSource) -> Result<Self, AssetError> {
+        match texture {
+            description::Texture::Checker { even, odd, size } => Ok(Self::Checker { even: *even, odd: *odd, size: *size }),
+            description::Texture::Image { file, color_space, wrap, .. } => {
+                let bytes = assets.bytes(*file).ok_or_else(|| AssetError::new(format!("the image's bytes ({file}) are not here")))?;
+                Ok(Self::Image { image: Arc::new(Image::decode(&bytes, *color_space)?), wrap: *wrap })
+            }
+        }
+    }
+
+    /// The colour at `uv` (finite): linear Rec. 709, and opacity in [0, 1].
+    #[inline]
+    pub fn rgba(&self, uv: DVec2) -> [f32; 4] {
+        match self {
+            Self::Checker { even, odd, size } => {
+                let square = (uv.x / size).floor() + (uv.y / size).floor();
+                // Even if half of it is whole: the remainder itself would be a call.
+                let [r, g, b] = if (square * 0.5).floor() == square * 0.5 { *even } else { *odd };
+                [r, g, b, 1.0]
+            }
+            Self::Image { image, wrap } => bilinear(image, *wrap, uv),
+        }
+    }
+
+    /// Whether some place of it may not be opaque.
+    pub fn has_opacity(&self) -> bool {
+        match self {
+            Self::Checker { .. } => false,
+            Self::Image { image, .. } => image.has_opacity(),
+        }
+    }
+}
+
+fn bilinear(image: &Image, wrap: [Wrap; 2], uv: DVec2) -> [f32; 4] {
+    let [width, height] = image.size();
+    let ([left, right], s) = wrap::neighbours(uv.x, width, wrap[0]);
+    let ([top, bottom], t) = wrap::neighbours(uv.y, height, wrap[1]);
+    let upper = mix(image.pixel(left, top), image.pixel(right, top), s);
+    let lower = mix(image.pixel(left, bottom), image.pixel(right, bottom), s);
+    mix(upper, lower, t)
+}
+
+fn mix(a: [f32; 4], b: [f32; 4], t: f32) -> [f32; 4] {
+    std::array::from_fn(|i| (1.0 - t) * a[i] + t * b[i])
+}

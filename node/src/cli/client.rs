@@ -1,0 +1,221 @@
+//! A client's connection to a coordinator.
+
+use std::{
+    fs,
+    io::Write,
+    net::{SocketAddr, ToSocketAddrs},
+    path::{Path, PathBuf},
+};
+
+use quinn::{Connection, Endpoint, RecvStream, SendStream};
+use tessera_engine::description::{AssetSource, MemoryAssets};
+use tokio::{io::AsyncWriteExt, time::timeout};
+
+use crate::{
+    error::{Error, ExitCode, Result},
+    farm::JobId,
+    job::JobDescription,
+    limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
+    wire::{self, FileHeader, JobState, JobStatus, NodeStatus, Request, Response, Status, tls::Identity},
+};
+
+/// How subcommands find their coordinator.
+#[derive(clap::Args)]
+pub struct Access {
+    /// Host and port of the coordinator.
+    #[arg(long, env = "TESSERA_COORDINATOR", value_name = "HOST:PORT")]
+    pub coordinator: String,
+    /// The client's identity: a file made by `tessera keys`, or a folder that holds one.
+    #[arg(long, env = "TESSERA_KEYS", value_name = "PATH")]
+    pub keys: PathBuf,
+}
+
+impl Access {
+    /// Connects.
+    ///
+    /// # Errors
+    /// As [`Client::connect`], and when the identity cannot be read.
+    pub async fn connect(&self) -> Result<Client> {
+        Client::connect(&self.coordinator, &Identity::load(&self.keys, wire::tls::Role::Client)?).await
+    }
+}
+
+/// A connection to a coordinator.
+pub struct Client {
+    endpoint: Endpoint,
+    connection: Connection,
+    address: String,
+}
+
+impl Client {
+    /// Connects.
+    ///
+    /// # Errors
+    /// When the coordinator cannot be reached, or either side refuses the other's certificate.
+    pub async fn connect(address: &str, identity: &Identity) -> Result<Self> {
+        let failed = |error: String| {
+            Error::new(ExitCode::Farm, format!("cannot reach the coordinator at {address}: {error}"))
+                .with_help("check the address, that the coordinator runs, and that the keys are of its farm")
+        };
+        let socket = resolve(address).map_err(failed)?;
+        let endpoint = wire::client(identity, socket)?;
+        let connecting = timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket)).await;
+        let connection = connecting.map_err(|_| failed(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())))?.map_err(failed)?;
+        Ok(Self { endpoint, connection, address: address.to_owned() })
+    }
+
+    /// Ends the connection.
+    pub async fn close(&self) {
+        self.connection.close(0_u8.into(), b"");
+        let _ = timeout(FAREWELL, self.endpoint.wait_idle()).await;
+    }
+
+    /// Submits a job with the assets that the coordinator does not have, and returns its number.
+    ///
+    /// # Errors
+    /// When the coordinator refuses the job or is lost.
+    pub async fn submit(&self, description: &JobDescription, assets: &MemoryAssets, min_nodes: u32) -> Result<JobId> {
+        let request = Request::Submit { description: Box::new(description.clone()), min_nodes };
+        let (mut send, mut receive) = self.request(&request).await?;
+        let wanted = match self.response(&mut receive).await? {
+            Response::Wanted(wanted) => wanted,
+            other => return Err(self.unexpected(&other)),
+        };
+        for id in wanted {
+            let bytes =
+                assets.bytes(id).ok_or_else(|| Error::new(ExitCode::Internal, format!("the job names asset {id}, which is not in it")))?;
+            send.write_u64_le(bytes.len() as u64).await.map_err(|error| self.lost(error))?;
+            send.write_all(&bytes).await.map_err(|error| self.lost(error))?;
+        }
+        match self.response(&mut receive).await? {
+            Response::Submitted { job } => Ok(job),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    /// Follows a job to its end; `see` is told of every change.
+    ///
+    /// # Errors
+    /// When there is no such job, or the coordinator is lost.
+    pub async fn watch(&self, job: JobId, mut see: impl FnMut(&JobStatus, &[NodeStatus])) -> Result<JobState> {
+        let (_send, mut receive) = self.request(&Request::Watch { job }).await?;
+        loop {
+            match self.response(&mut receive).await? {
+                Response::Job(status, nodes) => {
+                    see(&status, &nodes);
+                    if status.state.is_over() {
+                        return Ok(status.state);
+                    }
+                }
+                other => return Err(self.unexpected(&other)),
+            }
+        }
+    }
+
+    /// Fetches a job's files into a folder. They take their names when all are there.
+    ///
+    /// # Errors
+    /// When there are none, when the folder cannot be written, or when the coordinator is lost.
+    pub async fn fetch(&self, job: JobId, folder: &Path) -> Result<Vec<PathBuf>> {
+        let (_send, mut receive) = self.request(&Request::Fetch { job }).await?;
+        let headers = match self.response(&mut receive).await? {
+            Response::Files(headers) => headers,
+            other => return Err(self.unexpected(&other)),
+        };
+        let mut files = Vec::new();
+        for header in headers {
+            if !wire::is_plain_name(&header.name) || header.length > FILE_BYTES {
+                return Err(Error::new(
+                    ExitCode::Farm,
+                    format!("the coordinator names a file {:?} of {} bytes", header.name, header.length),
+                ));
+            }
+            files.push((folder.join(&header.name), self.receive(&mut receive, &header, folder).await?));
+        }
+        let mut paths = Vec::new();
+        for (path, file) in files {
+            file.persist(&path).map_err(|error| unwritable(&path, &error.error))?;
+            paths.push(path);
+        }
+        fs::File::open(folder).and_then(|folder| folder.sync_all()).map_err(|error| unwritable(folder, &error))?;
+        Ok(paths)
+    }
+
+    async fn receive(&self, receive: &mut RecvStream, header: &FileHeader, folder: &Path) -> Result<tempfile::NamedTempFile> {
+        let refused = |error: std::io::Error| unwritable(&folder.join(&header.name), &error);
+        let mut file = tempfile::Builder::new().permissions(plain_permissions()).tempfile_in(folder).map_err(refused)?;
+        let mut chunk = vec![0; READ_CHUNK_BYTES];
+        let mut left = header.length;
+        while left > 0 {
+            let wanted = usize::try_from(left).unwrap_or(READ_CHUNK_BYTES).min(READ_CHUNK_BYTES);
+            receive.read_exact(&mut chunk[..wanted]).await.map_err(|error| self.lost(error))?;
+            file.write_all(&chunk[..wanted]).map_err(refused)?;
+            left -= wanted as u64;
+        }
+        file.as_file().sync_all().map_err(refused)?;
+        Ok(file)
+    }
+
+    /// Nodes and jobs.
+    ///
+    /// # Errors
+    /// When the coordinator is lost.
+    pub async fn status(&self) -> Result<Status> {
+        let (_send, mut receive) = self.request(&Request::Status).await?;
+        match self.response(&mut receive).await? {
+            Response::Status(status) => Ok(status),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    /// Ends a job.
+    ///
+    /// # Errors
+    /// When it neither runs nor waits, or the coordinator is lost.
+    pub async fn cancel(&self, job: JobId) -> Result<()> {
+        let (_send, mut receive) = self.request(&Request::Cancel { job }).await?;
+        match self.response(&mut receive).await? {
+            Response::Done => Ok(()),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    async fn request(&self, request: &Request) -> Result<(SendStream, RecvStream)> {
+        let (mut send, receive) = self.connection.open_bi().await.map_err(|error| self.lost(error))?;
+        wire::write(&mut send, request, REQUEST_BYTES).await.map_err(|error| self.lost(error))?;
+        Ok((send, receive))
+    }
+
+    async fn response(&self, receive: &mut RecvStream) -> Result<Response> {
+        wire::read(receive, RESPONSE_BYTES).await.map_err(|error| self.lost(error))
+    }
+
+    fn lost(&self, error: impl std::fmt::Display) -> Error {
+        let reason = self.connection.close_reason().map_or_else(|| error.to_string(), |reason| reason.to_string());
+        Error::new(ExitCode::Farm, format!("the coordinator at {} is lost: {reason}", self.address))
+    }
+
+    fn unexpected(&self, response: &Response) -> Error {
+        match response {
+            Response::Refused { reason } => Error::new(ExitCode::Farm, format!("the coordinator at {} refuses: {reason}", self.address)),
+            _ => Error::new(ExitCode::Farm, format!("the coordinator at {} answers something else", self.address)),
+        }
+    }
+}
+
+fn unwritable(path: &Path, error: &std::io::Error) -> Error {
+    Error::new(ExitCode::File, format!("{}: cannot be written: {error}", path.display()))
+}
+
+/// Files of one's own, readable by others as the umask says.
+fn plain_permissions() -> fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+fn resolve(address: &str) -> Result<SocketAddr, String> {
+    let mut found = address.to_socket_addrs().map_err(|error| match error.kind() {
+        std::io::ErrorKind::InvalidInput => "it is not HOST:PORT, such as lead:7143".to_owned(),
+        _ => error.to_string(),
+    })?;
+    found.next().ok_or_else(|| "it has no address".to_owned())
+}

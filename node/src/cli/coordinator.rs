@@ -1,0 +1,100 @@
+//! `tessera coordinator`: leads a farm.
+
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    path::PathBuf,
+};
+
+use sd_notify::NotifyState;
+use tokio::{net::TcpListener, sync::oneshot, time::interval};
+
+use super::{
+    render::seconds,
+    runtime::{interrupted, notify, runtime, start_logs},
+};
+use crate::{
+    config::{Config, PORT, required},
+    coordinator::{Coordinator, Options},
+    error::{Error, ExitCode, Result},
+    farm::FarmConfig,
+    limits::NO_NODE_TIMEOUT,
+    web,
+    wire::tls::{Identity, Role},
+};
+
+/// Arguments of `tessera coordinator`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Address and UDP port to listen on; port 0 takes a free one [default: 0.0.0.0:7143].
+    #[arg(long, env = "TESSERA_LISTEN", value_name = "ADDR:PORT")]
+    listen: Option<SocketAddr>,
+    /// Folder of jobs, assets and the journal, made where it is missing.
+    #[arg(long, env = "TESSERA_DATA", value_name = "DIR")]
+    data: Option<PathBuf>,
+    /// The coordinator's identity: a file made by `tessera keys`, or a folder that holds one.
+    #[arg(long, env = "TESSERA_KEYS", value_name = "PATH")]
+    keys: Option<PathBuf>,
+    /// Seconds that a job waits for any node before it fails [default: 60].
+    #[arg(long, value_name = "SECONDS")]
+    no_node_timeout: Option<f64>,
+    /// Address of the status page, plain HTTP for anyone who can reach it: keep it on loopback, or behind a proxy that asks who is there.
+    #[arg(long, env = "TESSERA_WEB", value_name = "ADDR:PORT")]
+    web: Option<SocketAddr>,
+    /// Settings file; flags and environment go before it.
+    #[arg(long, env = "TESSERA_CONFIG", value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+/// Runs `tessera coordinator`.
+pub fn run(args: Args) -> Result<()> {
+    start_logs("info");
+    let file = Config::read(args.config.as_deref())?.coordinator;
+    let no_node_timeout = args.no_node_timeout.or(file.no_node_timeout).unwrap_or(NO_NODE_TIMEOUT.as_secs_f64());
+    let options = Options {
+        listen: args.listen.or(file.listen).unwrap_or_else(|| SocketAddr::from((Ipv4Addr::UNSPECIFIED, PORT))),
+        data: required(args.data.or(file.data), "--data", "coordinator.data")?,
+        identity: Identity::load(&required(args.keys.or(file.keys), "--keys", "coordinator.keys")?, Role::Coordinator)?,
+        farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
+    };
+    let web = args.web.or(file.web);
+    runtime()?.block_on(async {
+        let page = match web {
+            Some(address) => Some(listen(address).await?),
+            None => None,
+        };
+        let coordinator = Coordinator::start(options).await?;
+        println!("listening on {}", coordinator.address);
+        let (stop, stopped) = oneshot::channel::<()>();
+        if let Some(listener) = page {
+            if let Ok(address) = listener.local_addr() {
+                println!("status page at http://{address}/");
+            }
+            tokio::spawn(web::serve(listener, coordinator.page(), async { drop(stopped.await) }));
+        }
+        notify(NotifyState::Ready);
+        let feeding = tokio::spawn(feed_watchdog(coordinator.status.clone()));
+        interrupted().await;
+        notify(NotifyState::Stopping);
+        feeding.abort();
+        drop(stop);
+        coordinator.stop().await;
+        Ok(())
+    })
+}
+
+async fn listen(address: SocketAddr) -> Result<TcpListener> {
+    TcpListener::bind(address).await.map_err(|error| {
+        Error::new(ExitCode::Farm, format!("the status page cannot be served at {address}: {error}"))
+            .with_help("choose another address with --web")
+    })
+}
+
+/// Tells the service manager that the coordinator lives: as long as its core can be heard.
+async fn feed_watchdog<T>(status: tokio::sync::watch::Receiver<T>) {
+    let Some(patience) = sd_notify::watchdog_enabled() else { return };
+    let mut feed = interval(patience / 3);
+    while status.has_changed().is_ok() {
+        feed.tick().await;
+        notify(NotifyState::Watchdog);
+    }
+}

@@ -1,0 +1,41 @@
+//! Rendering in this process without a farm: the plainest way from a job to its picture, against which the farm is held.
+
+use std::path::{Path, PathBuf};
+
+use tessera_engine::{part::Rect, scene::Scene};
+
+use super::here;
+use crate::{
+    coordinator::write_pictures,
+    error::{Error, ExitCode, Result},
+    job::{JobDescription, Policies},
+    limits::POLICY_TIMEOUT,
+    schedule::{CostMap, NodeId, NodePower, Split, split},
+};
+
+/// Renders with `threads` threads, which take parts in the order of the split, and writes EXR and PNG.
+///
+/// # Errors
+/// When the job's own split fails, or the folder refuses the files.
+pub fn render(description: &JobDescription, scene: &Scene, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
+    let parts = parts(description, threads)?;
+    let film = here::parts(scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
+    write_pictures(description, &film, folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())
+}
+
+fn parts(description: &JobDescription, threads: u32) -> Result<Vec<Rect>> {
+    let (width, height) = (description.frame.film.width, description.frame.film.height);
+    match (&description.split, &description.script) {
+        (Split::Script, Some(bundle)) => {
+            let this = NodePower { id: NodeId(0), name: "this process".to_owned(), lanes: threads, power: 1.0 };
+            let even = CostMap { cell: width.max(height), columns: 1, rows: 1, seconds_per_pixel: vec![1.0] };
+            Policies::new(bundle, &description.parameters)?
+                .split(width, height, &even, &[this], POLICY_TIMEOUT)
+                .map_err(|error| Error::new(ExitCode::Job, error))
+        }
+        (Split::Script, None) => Err(Error::new(ExitCode::Internal, "a split by a script that is not there")),
+        (Split::Grid { width: columns, height: rows }, _) => Ok(split::grid(width, height, *columns, *rows)),
+        (Split::Strips { count }, _) => Ok(split::strips(width, height, *count)),
+    }
+}

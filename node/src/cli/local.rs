@@ -1,0 +1,121 @@
+//! A farm on this machine for one job: a coordinator in this process, nodes in processes of their own, keys that nobody keeps.
+
+use std::{
+    net::{Ipv4Addr, SocketAddr},
+    process::{ExitStatus, Stdio},
+};
+
+use tokio::{
+    process::{Child, Command},
+    task::JoinSet,
+};
+
+use super::{client::Client, progress::Progress};
+use crate::{
+    coordinator::{Coordinator, Options},
+    error::{Error, ExitCode, Result},
+    farm::FarmConfig,
+    wire::tls::{Authority, Identity, Role},
+};
+
+/// The farm. Its nodes end with it.
+pub struct LocalFarm {
+    coordinator: Coordinator,
+    client: Identity,
+    nodes: JoinSet<(String, std::io::Result<ExitStatus>)>,
+    /// Keys, journal and output, until they are fetched.
+    folder: tempfile::TempDir,
+}
+
+impl LocalFarm {
+    /// Starts a coordinator and `nodes` node processes of `lanes` rendering threads each.
+    ///
+    /// # Errors
+    /// When the machine gives no port, no processes or no temporary folder.
+    pub async fn start(nodes: u32, lanes: u32, farm: FarmConfig, progress: &Progress) -> Result<Self> {
+        let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start a farm on this machine: {error}"));
+        let folder = tempfile::Builder::new().prefix("tessera-").tempdir().map_err(internal)?;
+        let authority = Authority::new()?;
+        let options = Options {
+            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+            data: folder.path().join("data"),
+            identity: authority.issue(Role::Coordinator, "coordinator")?,
+            farm,
+        };
+        let coordinator = Coordinator::start(options).await?;
+        let client = authority.issue(Role::Client, "render")?;
+        let mut local = Self { coordinator, client, nodes: JoinSet::new(), folder };
+        for number in 1..=nodes {
+            let name = format!("node-{number}");
+            let child = local.spawn(&authority.issue(Role::Node, &name)?, lanes).map_err(internal)?;
+            progress.started(&name, child.id().unwrap_or_default());
+            local.nodes.spawn(wait(name, child));
+        }
+        Ok(local)
+    }
+
+    /// Its own process group, so that Ctrl-C reaches this process alone, which then ends its nodes in order.
+    fn spawn(&self, identity: &Identity, lanes: u32) -> std::io::Result<Child> {
+        let keys = identity.save(self.folder.path()).map_err(std::io::Error::other)?;
+        let quiet = std::env::var_os("TESSERA_LOG").unwrap_or_else(|| "error".into());
+        Command::new(std::env::current_exe()?)
+            .args([
+                "node",
+                "--with-parent",
+                "--coordinator",
+                &self.coordinator.address.to_string(),
+                "--lanes",
+                &lanes.to_string(),
+                "--keys",
+            ])
+            .arg(keys)
+            .env("TESSERA_LOG", quiet)
+            .env_remove("TESSERA_CONFIG")
+            .env_remove("TESSERA_CACHE")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .process_group(0)
+            .kill_on_drop(true)
+            .spawn()
+    }
+
+    /// A client of the farm.
+    ///
+    /// # Errors
+    /// As [`Client::connect`].
+    pub async fn client(&self) -> Result<Client> {
+        Client::connect(&self.coordinator.address.to_string(), &self.client).await
+    }
+
+    /// Waits until a node's process has ended, and says which and how. Never ends while there is no node process at all.
+    ///
+    /// # Errors
+    /// When it was the last one: nobody is left to render.
+    pub async fn node_ended(&mut self) -> Result<String> {
+        let Some(ended) = self.nodes.join_next().await else { return std::future::pending().await };
+        let said = match ended {
+            Ok((name, Ok(status))) => format!("{name}: its process ended ({status})"),
+            Ok((name, Err(error))) => format!("{name}: its process ended ({error})"),
+            Err(error) => format!("a node's process was lost: {error}"),
+        };
+        if self.nodes.is_empty() {
+            return Err(Error::new(ExitCode::Job, format!("no node is left to render the job; the last one was {said}"))
+                .with_help("earlier output files are as they were"));
+        }
+        Ok(said)
+    }
+
+    /// Ends nodes and coordinator.
+    pub async fn stop(mut self) {
+        self.nodes.shutdown().await;
+        self.coordinator.stop().await;
+    }
+}
+
+async fn wait(name: String, mut child: Child) -> (String, std::io::Result<ExitStatus>) {
+    // The child's stdin stays open as long as this process lives: that is how the node knows.
+    let stdin = child.stdin.take();
+    let status = child.wait().await;
+    drop(stdin);
+    (name, status)
+}

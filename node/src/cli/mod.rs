@@ -1,0 +1,107 @@
+//! The command line: one file a subcommand.
+//!
+//! A subcommand is a module with `struct Args` (a `clap::Args`; its fields' docs are its help) and `fn run(Args) -> Result<()>`. It is mounted by
+//! three lines below: its `mod`, its variant (whose doc is its line in `--help`), its arm in `run`. What it prints on stdout is its answer;
+//! progress, logs and errors go to stderr.
+
+mod cancel;
+mod check;
+mod client;
+mod coordinator;
+mod direct;
+mod fetch;
+mod here;
+mod keys;
+mod local;
+mod node;
+mod plan;
+mod progress;
+mod render;
+mod report;
+mod runtime;
+mod script;
+mod simulate;
+mod status;
+mod submit;
+mod tradeoff;
+mod verify;
+mod watch;
+
+use std::process;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::Result;
+
+/// Renders one heavy frame on every machine you have; any of them may die meanwhile.
+#[derive(Parser)]
+#[command(name = "tessera", version)]
+struct CommandLine {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Renders a job: on nodes of this machine, or on a farm.
+    Render(render::Args),
+    /// Leads a farm.
+    Coordinator(coordinator::Args),
+    /// Renders for a farm.
+    Node(node::Args),
+    /// Hands a job to a farm.
+    Submit(submit::Args),
+    /// Shows the nodes and jobs of a farm.
+    Status(status::Args),
+    /// Follows a job to its end.
+    Watch(watch::Args),
+    /// Brings a job's files here.
+    Fetch(fetch::Args),
+    /// Ends a job.
+    Cancel(cancel::Args),
+    /// Runs a job script and says what would be rendered.
+    Check(check::Args),
+    /// The farm's authority, and the identities that it certifies.
+    Keys(keys::Args),
+    /// Shows how a farm would split and assign a job, and when it would be done.
+    Plan(plan::Args),
+    /// Renders a job with ladders of samples and depths: error against time.
+    Tradeoff(tradeoff::Args),
+    /// Shows what came of jobs: one in detail, several in the paper's table.
+    Report(report::Args),
+    /// Runs the farm's scheduler on virtual time: plans a farm, or replays a schedule of faults.
+    Simulate(simulate::Args),
+    /// Checks a picture against its manifest.
+    Verify(verify::Args),
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
+        Command::Render(args) => render::run(args),
+        Command::Coordinator(args) => coordinator::run(args),
+        Command::Node(args) => node::run(args),
+        Command::Submit(args) => submit::run(args),
+        Command::Status(args) => status::run(args),
+        Command::Watch(args) => watch::run(args),
+        Command::Fetch(args) => fetch::run(args),
+        Command::Cancel(args) => cancel::run(args),
+        Command::Check(args) => check::run(args),
+        Command::Keys(args) => keys::run(args),
+        Command::Plan(args) => plan::run(args),
+        Command::Tradeoff(args) => tradeoff::run(args),
+        Command::Report(args) => report::run(args),
+        Command::Simulate(args) => simulate::run(args),
+        Command::Verify(args) => verify::run(args),
+    }
+}
+
+/// The program: reads the command line, runs the subcommand, says an error on stderr. The exit code is that of [`crate::error::ExitCode`].
+pub fn main() -> process::ExitCode {
+    match run(CommandLine::parse().command) {
+        Ok(()) => process::ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            process::ExitCode::from(error.code as u8)
+        }
+    }
+}

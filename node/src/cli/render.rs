@@ -1,0 +1,176 @@
+//! `tessera render`: renders a job here, or on a farm, and puts its files into a folder.
+
+use std::{
+    fs,
+    io::IsTerminal,
+    path::{Path, PathBuf},
+    time::Duration,
+};
+
+use serde_json::json;
+
+use super::{
+    client::Client,
+    direct,
+    local::LocalFarm,
+    node::cores,
+    progress::{Progress, Show, event},
+    runtime::{block_on, start_logs},
+    script::Script,
+};
+use crate::{
+    error::{Error, ExitCode, Result},
+    farm::FarmConfig,
+    job::LoadedJob,
+    limits::NO_NODE_TIMEOUT,
+    manifest,
+    report::{self, Style},
+    wire::{
+        JobState,
+        tls::{Identity, Role},
+    },
+};
+
+/// Arguments of `tessera render`.
+#[derive(clap::Args)]
+pub struct Args {
+    #[command(flatten)]
+    script: Script,
+    /// Node processes on this machine.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    nodes: u32,
+    /// Rendering threads of each node [default: the cores, shared out].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    lanes: Option<u32>,
+    /// Render in this process, with so many threads: no farm, no probe, no report.
+    #[arg(long, conflicts_with_all = ["nodes", "lanes", "coordinator"], value_parser = clap::value_parser!(u32).range(1..=4096))]
+    threads: Option<u32>,
+    /// Render on the farm of this coordinator.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with_all = ["nodes", "lanes"], requires = "keys")]
+    coordinator: Option<String>,
+    /// The client's identity on that farm.
+    #[arg(long, env = "TESSERA_KEYS", value_name = "PATH")]
+    keys: Option<PathBuf>,
+    /// Folder of the output files, made where it is missing.
+    #[arg(long, short, default_value = ".", value_name = "DIR")]
+    output: PathBuf,
+    /// Seconds that the job waits for any node of this machine.
+    #[arg(long, value_name = "SECONDS", default_value_t = NO_NODE_TIMEOUT.as_secs_f64())]
+    no_node_timeout: f64,
+    #[command(flatten)]
+    show: Show,
+}
+
+/// Runs `tessera render`.
+pub fn run(args: Args) -> Result<()> {
+    start_logs("error");
+    let (loaded, scene) = args.script.load()?;
+    check_writable(&args.output)?;
+    if let Some(threads) = args.threads {
+        let files = direct::render(&loaded.description, &scene, threads, &args.output)?;
+        return show_files(args.show, &files);
+    }
+    drop(scene);
+    let progress = args.show.progress();
+    loaded.description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
+    let files = block_on(async {
+        match &args.coordinator {
+            Some(address) => on_farm(address, args.keys.as_deref(), &loaded, progress, &args.output).await,
+            None => here(&args, &loaded, progress).await,
+        }
+    })?;
+    report(args.show, &files, &args.output.join(&loaded.description.output.manifest))
+}
+
+async fn on_farm(address: &str, keys: Option<&Path>, loaded: &LoadedJob, progress: Progress, output: &Path) -> Result<Vec<PathBuf>> {
+    let keys = keys.ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
+    let client = Client::connect(address, &Identity::load(keys, Role::Client)?).await?;
+    let files = follow(&client, loaded, 1, progress, output).await?;
+    client.close().await;
+    Ok(files)
+}
+
+async fn here(args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec<PathBuf>> {
+    let lanes = args.lanes.unwrap_or_else(|| (cores() / args.nodes).max(1));
+    let no_node_timeout = seconds(args.no_node_timeout)?;
+    let farm = FarmConfig { no_node_timeout, ..FarmConfig::default() };
+    let mut local = LocalFarm::start(args.nodes, lanes, farm, &progress).await?;
+    let client = local.client().await?;
+    let work = follow(&client, loaded, args.nodes, progress, &args.output);
+    tokio::pin!(work);
+    let files = loop {
+        tokio::select! {
+            files = &mut work => break files?,
+            ended = local.node_ended() => {
+                let said = ended?;
+                if !args.show.quiet && !args.show.json {
+                    eprintln!("{said}");
+                }
+            }
+        }
+    };
+    client.close().await;
+    local.stop().await;
+    Ok(files)
+}
+
+/// A length of time given on the command line.
+///
+/// # Errors
+/// When it is none.
+pub fn seconds(number: f64) -> Result<Duration> {
+    Duration::try_from_secs_f64(number).map_err(|error| Error::new(ExitCode::Usage, format!("{number} seconds: {error}")))
+}
+
+/// Submits a job, shows how it fares, fetches its files.
+async fn follow(client: &Client, loaded: &LoadedJob, min_nodes: u32, mut progress: Progress, output: &Path) -> Result<Vec<PathBuf>> {
+    let job = client.submit(&loaded.description, &loaded.assets, min_nodes).await?;
+    progress.submitted(job.0);
+    let state = client.watch(job, |job, nodes| progress.see(job, nodes)).await?;
+    progress.end();
+    outcome(state)?;
+    client.fetch(job, output).await
+}
+
+/// An error for a job that did not end well.
+///
+/// # Errors
+/// Exactly then.
+pub fn outcome(state: JobState) -> Result<()> {
+    match state {
+        JobState::Failed(reason) => Err(Error::new(ExitCode::Job, format!("the job failed: {reason}"))),
+        JobState::Cancelled(reason) => Err(Error::new(ExitCode::Job, format!("the job was cancelled: {reason}"))),
+        _ => Ok(()),
+    }
+}
+
+/// Makes the folder where it is missing and sees that files can be written into it, before anything is rendered.
+pub fn check_writable(folder: &Path) -> Result<()> {
+    let refused = |error: std::io::Error| {
+        let why = if folder.is_file() { "it is a file, not a folder".to_owned() } else { error.to_string() };
+        Error::new(ExitCode::File, format!("{}: output cannot be written there: {why}", folder.display()))
+            .with_help("choose another folder with -o DIR")
+    };
+    fs::create_dir_all(folder).map_err(refused)?;
+    tempfile::tempfile_in(folder).map(drop).map_err(refused)
+}
+
+/// The report at the end.
+pub fn report(show: Show, files: &[PathBuf], manifest: &Path) -> Result<()> {
+    let manifest = manifest::read(manifest)?;
+    if show.json {
+        event(&json!({ "event": "finished", "files": files, "report": manifest.report }));
+    } else if !show.quiet {
+        print!("{}", report::text(&manifest, files, Style { color: std::io::stdout().is_terminal() }));
+    }
+    Ok(())
+}
+
+fn show_files(show: Show, files: &[PathBuf]) -> Result<()> {
+    if show.json {
+        event(&json!({ "event": "finished", "files": files }));
+    } else if !show.quiet {
+        files.iter().for_each(|file| println!("{}", file.display()));
+    }
+    Ok(())
+}

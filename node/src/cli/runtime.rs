@@ -1,0 +1,81 @@
+//! What every subcommand that talks needs: logs, a runtime, and an ear for the user's signals.
+
+use std::{future::Future, io::IsTerminal, thread, time::Duration};
+
+use sd_notify::NotifyState;
+use tokio::{
+    runtime::Runtime,
+    signal::unix::{SignalKind, signal},
+    sync::watch,
+};
+use tracing_subscriber::EnvFilter;
+
+use crate::error::{Error, ExitCode, Result};
+
+/// Logs go to stderr, as the environment variable `TESSERA_LOG` says (`warn`, `info`, `tessera_node=debug`, ...).
+pub fn start_logs(default: &str) {
+    let filter = EnvFilter::try_from_env("TESSERA_LOG").unwrap_or_else(|_| EnvFilter::new(default));
+    // Only the first caller's settings count.
+    let colors = std::io::stderr().is_terminal();
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colors).with_target(false).try_init();
+}
+
+/// A runtime with two threads: the network's work is small.
+///
+/// # Errors
+/// When the system gives no threads.
+pub fn runtime() -> Result<Runtime> {
+    tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))
+}
+
+/// Runs a client's work until it is done or the user interrupts it.
+///
+/// # Errors
+/// Those of the work; [`ExitCode::Interrupted`] on Ctrl-C or SIGTERM.
+pub fn block_on<T>(work: impl Future<Output = Result<T>>) -> Result<T> {
+    let runtime = runtime()?;
+    let result = runtime.block_on(async {
+        tokio::select! {
+            result = work => result,
+            () = interrupted() => Err(Error::new(ExitCode::Interrupted, "interrupted")),
+        }
+    });
+    runtime.shutdown_timeout(Duration::from_millis(100));
+    result
+}
+
+/// Waits for Ctrl-C or SIGTERM.
+pub async fn interrupted() {
+    let (Ok(mut interrupt), Ok(mut terminate)) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate())) else {
+        return std::future::pending().await;
+    };
+    tokio::select! {
+        _ = interrupt.recv() => {}
+        _ = terminate.recv() => {}
+    }
+}
+
+/// Turns true on Ctrl-C or SIGTERM.
+///
+/// # Errors
+/// When the system gives no threads.
+pub fn stop_on_signals() -> Result<watch::Receiver<bool>> {
+    let (stop, stopped) = watch::channel(false);
+    let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
+    let listen = move || {
+        runtime.block_on(interrupted());
+        stop.send_replace(true);
+    };
+    thread::Builder::new().name("signals".to_owned()).spawn(listen).map_err(internal)?;
+    Ok(stopped)
+}
+
+/// Tells the service manager how things stand; without one there is nobody to tell.
+pub fn notify(state: NotifyState<'_>) {
+    let _ = sd_notify::notify(&[state]);
+}

@@ -1,0 +1,38 @@
+//! Job scripts on the command line.
+
+use std::path::PathBuf;
+
+use tessera_engine::scene::Scene;
+
+use crate::{
+    error::Result,
+    job::{self, LoadedJob},
+};
+
+/// A job script and its parameters.
+#[derive(clap::Args)]
+pub struct Script {
+    /// The job script.
+    #[arg(value_name = "JOB")]
+    pub path: PathBuf,
+    /// Sets a parameter of the script; may be given several times.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parameter)]
+    pub parameters: Vec<(String, String)>,
+}
+
+fn parameter(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.is_empty() => Ok((name.to_owned(), value.to_owned())),
+        _ => Err("write it as NAME=VALUE".to_owned()),
+    }
+}
+
+impl Script {
+    /// Runs the script and compiles its scene. What is not modelled becomes a warning of the description.
+    ///
+    /// # Errors
+    /// [`crate::error::ExitCode::Script`], with the place in the script.
+    pub fn load(&self) -> Result<(LoadedJob, Scene)> {
+        job::load(&self.path, &self.parameters.iter().cloned().collect())
+    }
+}

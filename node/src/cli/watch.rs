@@ -1,0 +1,34 @@
+//! `tessera watch`: follows a job to its end.
+
+use super::{
+    client::Access,
+    progress::Show,
+    render::outcome,
+    runtime::{block_on, start_logs},
+};
+use crate::{error::Result, farm::JobId};
+
+/// Arguments of `tessera watch`.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The job's number.
+    job: u64,
+    #[command(flatten)]
+    access: Access,
+    #[command(flatten)]
+    show: Show,
+}
+
+/// Runs `tessera watch`: the exit code tells how the job ended.
+pub fn run(args: Args) -> Result<()> {
+    start_logs("error");
+    let mut progress = args.show.progress();
+    let state = block_on(async {
+        let client = args.access.connect().await?;
+        let state = client.watch(JobId(args.job), |job, nodes| progress.see(job, nodes)).await?;
+        client.close().await;
+        Ok(state)
+    })?;
+    progress.end();
+    outcome(state)
+}

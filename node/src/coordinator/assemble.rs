@@ -1,0 +1,145 @@
+//! From committed parts to files.
+
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant, UNIX_EPOCH},
+};
+
+use tessera_engine::{
+    film::Film,
+    output::{exr, png},
+    part::{Counters, Rect, RenderedPart},
+};
+
+use super::{disk::Pixels, store::StoredJob};
+use crate::{
+    farm::{JobId, JobRecord, LeaseId},
+    job::{JobDescription, PixelType},
+    manifest::{self, ImageEntry, Submission},
+    schedule::{Assign, PartId, Split},
+};
+
+/// All that the files of a job are made of.
+pub struct Assembly {
+    /// The job.
+    pub job: JobId,
+    /// What was submitted.
+    pub stored: StoredJob,
+    /// What happened.
+    pub record: JobRecord,
+    /// Where the pixels are.
+    pub parts: Vec<(PartId, Rect, LeaseId)>,
+    /// Where the files go.
+    pub files: PathBuf,
+    /// When `record` was made.
+    pub made: Instant,
+}
+
+/// Why there are no files, in words.
+pub enum Refusal {
+    /// Pixels cannot be read back: they never will.
+    Pixels(String),
+    /// The disk refuses the files: it may have room again.
+    Files(String),
+}
+
+/// Writes EXR, PNG and manifest, each whole or not at all; the manifest last, so that where it stands all stand.
+///
+/// # Errors
+/// Pixels that cannot be read back, or a disk that refuses.
+pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<(), Refusal> {
+    let film = film(assembly, pixels).map_err(Refusal::Pixels)?;
+    write_files(assembly, &film).map_err(Refusal::Files)
+}
+
+fn write_files(assembly: &Assembly, film: &Film) -> Result<(), String> {
+    let image = write_pictures(&assembly.stored.description, film, &assembly.files)?;
+    let Assembly { job, stored, record, .. } = assembly;
+    let submission = Submission {
+        id: job.0,
+        name: stored.description.name.clone(),
+        parameters: stored.description.parameters.clone(),
+        submitted: UNIX_EPOCH + Duration::from_secs(stored.submitted),
+        warnings: stored.description.warnings.clone(),
+    };
+    let total = record.seconds + assembly.made.elapsed().as_secs_f64();
+    let manifest = manifest::build(submission, image, facts(&stored.description, record.clone()), total);
+    manifest::write(&assembly.files.join(&stored.description.output.manifest), &manifest).map_err(|error| error.to_string())
+}
+
+fn film(assembly: &Assembly, pixels: &Pixels) -> Result<Film, String> {
+    let size = &assembly.stored.description.frame.film;
+    let mut film = Film::new(size.width, size.height);
+    for (part, rect, lease) in &assembly.parts {
+        let bytes = pixels.read(assembly.job, *lease).map_err(|error| format!("part {}: {error}", part.0))?;
+        let rendered = RenderedPart::from_bytes(*rect, Counters::default(), &bytes).map_err(|error| format!("part {}: {error}", part.0))?;
+        film.place(&rendered).map_err(|error| error.to_string())?;
+    }
+    Ok(film)
+}
+
+/// Writes the EXR and the preview into a folder, and says what there is to know of them.
+///
+/// # Errors
+/// In words, when the disk refuses.
+pub fn write_pictures(description: &JobDescription, film: &Film, folder: &std::path::Path) -> Result<ImageEntry, String> {
+    let JobDescription { frame, output, .. } = description;
+    let hash = frame.hash().map_err(|error| error.to_string())?;
+    let (written, noted) = match output.pixel_type {
+        PixelType::Float => (exr::PixelType::Float, manifest::PixelType::Float),
+        PixelType::Half => (exr::PixelType::Half, manifest::PixelType::Half),
+    };
+    let path = folder.join(&output.exr);
+    let clamped = exr::write(&path, film, written, &exr::Identity::new(hash, frame.seed)).map_err(|error| error.to_string())?;
+    let pixels_hash = match output.pixel_type {
+        PixelType::Float => film.hash(),
+        PixelType::Half => exr::read(&path).map_err(|error| error.to_string())?.film.hash(),
+    };
+    if let Some(name) = &output.png {
+        png::write(&folder.join(name), film, output.exposure).map_err(|error| error.to_string())?;
+    }
+    Ok(ImageEntry {
+        exr: output.exr.clone(),
+        png: output.png.clone(),
+        width: film.width(),
+        height: film.height(),
+        samples: u64::from(frame.quality.samples),
+        seed: frame.seed,
+        image_hash: hash.to_string(),
+        pixel_type: noted,
+        pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
+        clamped,
+    })
+}
+
+fn facts(description: &JobDescription, record: JobRecord) -> manifest::JobRecord {
+    manifest::JobRecord {
+        split: split_words(&description.split),
+        assign: assign_words(description.assign).to_owned(),
+        outcome: "finished".to_owned(),
+        probe: record.probe,
+        nodes: record.nodes,
+        parts: record.parts,
+        events: record.events,
+        warnings: record.warnings,
+    }
+}
+
+/// A split in words.
+pub fn split_words(split: &Split) -> String {
+    match split {
+        Split::Grid { width, height } => format!("grid of {width} x {height} pixels"),
+        Split::Strips { count } => format!("{count} strips"),
+        Split::Script => "the script's own".to_owned(),
+    }
+}
+
+/// An assignment in words.
+pub fn assign_words(assign: Assign) -> &'static str {
+    match assign {
+        Assign::Naive => "naive",
+        Assign::Paper => "paper",
+        Assign::EarliestFinish => "earliest_finish",
+        Assign::Script => "the script's own",
+    }
+}

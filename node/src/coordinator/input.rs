@@ -1,0 +1,73 @@
+//! What comes to the one task that owns the farm's core.
+
+use std::net::SocketAddr;
+
+use tokio::sync::{mpsc, oneshot};
+
+use crate::{
+    farm::{Event, JobId, LeaseId},
+    job::JobDescription,
+    wire::{FromNode, Hello, PartHeader, ToNode},
+};
+
+/// One connection of a node; later ones have higher numbers.
+pub type LinkId = u64;
+
+/// To a node's connection.
+pub enum Outgoing {
+    /// Say this.
+    Say(ToNode),
+    /// Close it, and say why.
+    Close(String),
+}
+
+/// Something for the core's task.
+pub enum Input {
+    /// A node connected.
+    Joined {
+        /// Its connection.
+        link: LinkId,
+        /// The name in its certificate.
+        name: String,
+        /// What it said of itself.
+        hello: Hello,
+        /// Where it is.
+        address: SocketAddr,
+        /// The way to it.
+        outgoing: mpsc::Sender<Outgoing>,
+        /// Told when the core knows of it: what it hands in is read after that.
+        known: oneshot::Sender<()>,
+    },
+    /// A node gave a sign of life.
+    Heard(LinkId),
+    /// A node said something.
+    Said(LinkId, FromNode),
+    /// A node handed in a part whose pixels agree with their hash.
+    Delivered(LinkId, PartHeader, Vec<u8>),
+    /// A part came in damaged.
+    Damaged(LinkId, JobId, LeaseId),
+    /// A connection ended; where the node left, or was sent away, with the reason.
+    Gone(LinkId, Option<String>),
+    /// Files of a job could not be written: it is time to try again.
+    Assemble(JobId),
+    /// The rest of the program has an event for the core.
+    Event(Event),
+    /// A client hands in a job whose assets are all here.
+    Submit {
+        /// The job.
+        description: Box<JobDescription>,
+        /// Nodes to wait for.
+        min_nodes: u32,
+        /// The job's number, or why it is refused.
+        reply: oneshot::Sender<Result<JobId, String>>,
+    },
+    /// A client ends a job.
+    Cancel {
+        /// The job.
+        job: JobId,
+        /// Who.
+        reason: String,
+        /// Whether there was such a job.
+        reply: oneshot::Sender<Result<(), String>>,
+    },
+}

@@ -1,0 +1,146 @@
+//! The coordinator: the shell around the farm's core. Sockets, clock, disk and policies stand here; decisions stand in [`crate::farm`].
+
+mod assemble;
+mod core;
+mod disk;
+mod input;
+mod leases;
+mod policy;
+mod requests;
+mod session;
+mod status;
+mod store;
+
+use std::{net::SocketAddr, path::PathBuf, sync::Arc};
+
+use quinn::{Endpoint, Incoming};
+use rustls::pki_types::CertificateDer;
+use tokio::{
+    sync::{mpsc, oneshot, watch},
+    task::JoinHandle,
+};
+
+pub use self::assemble::write_pictures;
+use self::{
+    core::{Canary, Core},
+    disk::Disk,
+    input::Input,
+    leases::Leases,
+    policy::Thinker,
+    store::Store,
+};
+use crate::{
+    error::{Error, ExitCode, Result},
+    farm::FarmConfig,
+    limits::EVENT_QUEUE,
+    web::Snapshot,
+    wire::{
+        self, CLOSE_ANEW, CLOSE_RESUME, Status,
+        tls::{Identity, Peer, Role, peer},
+    },
+};
+
+/// How a coordinator is set up.
+pub struct Options {
+    /// Where it listens; port 0 takes a free one.
+    pub listen: SocketAddr,
+    /// Its folder.
+    pub data: PathBuf,
+    /// Proves that it is the coordinator.
+    pub identity: Identity,
+    /// Timeouts.
+    pub farm: FarmConfig,
+}
+
+/// What every connection needs.
+#[derive(Clone)]
+struct Shared {
+    inputs: mpsc::Sender<Input>,
+    store: Store,
+    leases: Leases,
+    status: watch::Receiver<Arc<Status>>,
+    /// What the status page shows; made only while somebody may look.
+    page: watch::Sender<Arc<Snapshot>>,
+}
+
+impl Shared {
+    /// Hands in what has an answer.
+    async fn ask<T>(&self, input: Input, answer: oneshot::Receiver<Result<T, String>>) -> Result<T, String> {
+        let ends = || "the coordinator ends".to_owned();
+        self.inputs.send(input).await.map_err(|_| ends())?;
+        answer.await.map_err(|_| ends())?
+    }
+}
+
+/// A running coordinator.
+pub struct Coordinator {
+    /// Where it listens.
+    pub address: SocketAddr,
+    /// How nodes and jobs stand.
+    pub status: watch::Receiver<Arc<Status>>,
+    page: watch::Sender<Arc<Snapshot>>,
+    endpoint: Endpoint,
+    tasks: [JoinHandle<()>; 2],
+}
+
+impl Coordinator {
+    /// Starts within the current runtime: reads the journal, then listens.
+    ///
+    /// # Errors
+    /// When the address is taken, or the folder cannot be used.
+    pub async fn start(options: Options) -> Result<Self> {
+        let folder = |error: std::io::Error| Error::new(ExitCode::File, format!("{}: {error}", options.data.display()));
+        let endpoint = wire::server(options.listen, &options.identity)?;
+        let address = endpoint.local_addr().map_err(|error| Error::new(ExitCode::Farm, error.to_string()))?;
+        let store = Store::open(&options.data).map_err(folder)?;
+        let (inputs, received) = mpsc::channel(EVENT_QUEUE);
+        let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone())?;
+        let thinker = Thinker::new(inputs.clone());
+        let canary = tokio::task::spawn_blocking(Canary::render).await.map_err(|error| error.to_string()).and_then(|canary| canary);
+        let canary = canary.map_err(|error| Error::new(ExitCode::Internal, format!("the canary part cannot be rendered: {error}")))?;
+        let (published, status) = watch::channel(Arc::default());
+        let page = watch::Sender::new(Arc::default());
+        let shared = Shared { inputs, store, leases: Leases::default(), status: status.clone(), page: page.clone() };
+        let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
+        let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared))];
+        Ok(Self { address, status, page, endpoint, tasks })
+    }
+
+    /// What the status page shows. From now on it is made.
+    pub fn page(&self) -> watch::Receiver<Arc<Snapshot>> {
+        self.page.subscribe()
+    }
+
+    /// Ends: connections are closed so that nodes keep what they hold and look for the coordinator again.
+    pub async fn stop(self) {
+        self.endpoint.close(CLOSE_RESUME.into(), b"the coordinator ends");
+        self.tasks.iter().for_each(JoinHandle::abort);
+        let _ = tokio::time::timeout(crate::limits::FAREWELL, self.endpoint.wait_idle()).await;
+    }
+}
+
+async fn accept(endpoint: Endpoint, shared: Shared) {
+    while let Some(incoming) = endpoint.accept().await {
+        tokio::spawn(serve(shared.clone(), incoming));
+    }
+}
+
+/// Lets a peer in, if its certificate is one of this farm: nothing is read before that is known.
+async fn serve(shared: Shared, incoming: Incoming) {
+    let address = incoming.remote_address();
+    let connection = match incoming.await {
+        Ok(connection) => connection,
+        Err(error) => return tracing::warn!(%address, %error, "a peer was refused"),
+    };
+    let identity = connection.peer_identity().and_then(|identity| identity.downcast::<Vec<CertificateDer<'static>>>().ok());
+    let peer = identity.as_ref().and_then(|chain| chain.first()).ok_or("no certificate".to_owned()).and_then(peer);
+    match peer {
+        Ok(Peer { role: Role::Node, name }) => session::serve(shared, connection, name, address).await,
+        Ok(Peer { role: Role::Client, name }) => requests::serve(shared, connection, name).await,
+        Ok(Peer { role: Role::Coordinator, .. }) => connection.close(CLOSE_ANEW.into(), b"there is a coordinator already"),
+        Err(error) => {
+            tracing::warn!(%address, error, "a peer was refused");
+            connection.close(CLOSE_ANEW.into(), error.as_bytes());
+        }
+    }
+}

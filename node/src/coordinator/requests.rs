@@ -1,0 +1,142 @@
+//! What clients ask for.
+
+use std::{io, path::Path};
+
+use quinn::{Connection, RecvStream, SendStream};
+use tokio::{io::AsyncWriteExt, sync::oneshot};
+
+use super::{Shared, input::Input};
+use crate::{
+    farm::JobId,
+    job::{JobDescription, Output},
+    limits::{PIXELS_PER_FRAME, REQUEST_BYTES, RESPONSE_BYTES},
+    wire::{self, FileHeader, FrameError, Request, Response},
+};
+
+/// Serves a client until its connection ends.
+pub async fn serve(shared: Shared, connection: Connection, name: String) {
+    while let Ok((send, receive)) = connection.accept_bi().await {
+        let (shared, name) = (shared.clone(), name.clone());
+        tokio::spawn(async move {
+            if let Err(error) = answer(&shared, &name, send, receive).await {
+                tracing::info!(client = name, %error, "a request was not answered to its end");
+            }
+        });
+    }
+}
+
+async fn answer(shared: &Shared, name: &str, mut send: SendStream, mut receive: RecvStream) -> Result<(), FrameError> {
+    match wire::read(&mut receive, REQUEST_BYTES).await? {
+        Request::Submit { description, min_nodes } => submit(shared, description, min_nodes, &mut send, &mut receive).await?,
+        Request::Status => {
+            let status = shared.status.borrow().as_ref().clone();
+            say(&mut send, &Response::Status(status)).await?;
+        }
+        Request::Watch { job } => watch(shared, job, &mut send).await?,
+        Request::Fetch { job } => fetch(shared, job, &mut send).await?,
+        Request::Cancel { job } => {
+            let (reply, answer) = oneshot::channel();
+            let cancel = Input::Cancel { job, reason: format!("cancelled by {name}"), reply };
+            let done = shared.ask(cancel, answer).await;
+            say(&mut send, &done.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
+        }
+    }
+    send.finish().map_err(io::Error::other)?;
+    Ok(())
+}
+
+async fn say(send: &mut SendStream, response: &Response) -> Result<(), FrameError> {
+    wire::write(send, response, RESPONSE_BYTES).await
+}
+
+async fn submit(
+    shared: &Shared,
+    description: Box<JobDescription>,
+    min_nodes: u32,
+    send: &mut SendStream,
+    receive: &mut RecvStream,
+) -> Result<(), FrameError> {
+    if let Err(reason) = check(&description) {
+        return say(send, &Response::Refused { reason }).await;
+    }
+    let wanted: Vec<_> = description.assets.iter().copied().filter(|id| !shared.store.asset(*id).exists()).collect();
+    say(send, &Response::Wanted(wanted.clone())).await?;
+    for id in wanted {
+        if let Err(error) = shared.store.receive(id, receive).await {
+            return say(send, &Response::Refused { reason: format!("an asset could not be taken: {error}") }).await;
+        }
+    }
+    let (reply, answer) = oneshot::channel();
+    let submitted = shared.ask(Input::Submit { description, min_nodes, reply }, answer).await;
+    say(send, &submitted.map_or_else(|reason| Response::Refused { reason }, |job| Response::Submitted { job })).await
+}
+
+/// What a client of another make could get wrong.
+fn check(description: &JobDescription) -> Result<(), String> {
+    let Output { exr, png, manifest, .. } = &description.output;
+    let names: Vec<&String> = [exr, manifest].into_iter().chain(png).collect();
+    for (i, name) in names.iter().enumerate() {
+        if !wire::is_plain_name(name) {
+            return Err(format!("the output {name:?} is no plain file name"));
+        }
+        if names[..i].contains(name) {
+            return Err(format!("two outputs are named {name:?}"));
+        }
+    }
+    let film = &description.frame.film;
+    let pixels = u64::from(film.width) * u64::from(film.height);
+    if pixels == 0 || pixels > PIXELS_PER_FRAME {
+        return Err(format!("a frame of {} x {} pixels; 1 to {PIXELS_PER_FRAME} pixels are allowed", film.width, film.height));
+    }
+    Ok(())
+}
+
+async fn watch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(), FrameError> {
+    let mut status = shared.status.clone();
+    let mut last = None;
+    loop {
+        let now = status.borrow_and_update().clone();
+        let Some(found) = now.jobs.iter().find(|found| found.job == job) else {
+            return say(send, &Response::Refused { reason: format!("there is no job {}", job.0) }).await;
+        };
+        if last.as_ref() != Some(&(found.clone(), now.nodes.clone())) {
+            last = Some((found.clone(), now.nodes.clone()));
+            say(send, &Response::Job(found.clone(), now.nodes.clone())).await?;
+        }
+        if found.state.is_over() || status.changed().await.is_err() {
+            return Ok(());
+        }
+    }
+}
+
+async fn fetch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(), FrameError> {
+    let folder = shared.store.files(job);
+    let files = match list(&folder) {
+        Ok(files) if !files.is_empty() => files,
+        _ => {
+            return say(
+                send,
+                &Response::Refused { reason: format!("there are no files of job {0}; `tessera watch {0}` tells its state", job.0) },
+            )
+            .await;
+        }
+    };
+    say(send, &Response::Files(files.clone())).await?;
+    for header in files {
+        let mut file = tokio::fs::File::open(folder.join(&header.name)).await?;
+        tokio::io::copy(&mut file, send).await?;
+    }
+    Ok(send.flush().await?)
+}
+
+fn list(folder: &Path) -> io::Result<Vec<FileHeader>> {
+    let mut files = Vec::new();
+    for entry in folder.read_dir()? {
+        let entry = entry?;
+        if let Some(name) = entry.file_name().to_str().filter(|name| wire::is_plain_name(name)) {
+            files.push(FileHeader { name: name.to_owned(), length: entry.metadata()?.len() });
+        }
+    }
+    files.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(files)
+}

@@ -1,0 +1,62 @@
+//! Errors as the user meets them: what is wrong, where, what to do, and a stable exit code.
+
+use std::fmt;
+
+/// Exit codes; their numbers are a promise to scripts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ExitCode {
+    /// A fault of the program or of the machine below it.
+    Internal = 1,
+    /// The command line is wrong.
+    Usage = 2,
+    /// The job script, or a file that it names, is wrong.
+    Script = 3,
+    /// A file cannot be read or written.
+    File = 4,
+    /// The farm cannot be reached, or refuses.
+    Farm = 5,
+    /// The job failed while it ran: no node, or a failed policy.
+    Job = 6,
+    /// An output does not agree with what was promised.
+    Verify = 7,
+    /// The user interrupted it (128 + SIGINT).
+    Interrupted = 130,
+}
+
+/// An error on its way to the user.
+#[derive(Debug)]
+pub struct Error {
+    /// The exit code.
+    pub code: ExitCode,
+    /// What is wrong, and where: `file:line: object: what`.
+    pub message: String,
+    /// The way out, where one is known.
+    pub help: Option<String>,
+}
+
+/// Results of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+impl Error {
+    /// An error without help.
+    pub fn new(code: ExitCode, message: impl Into<String>) -> Self {
+        Self { code, message: message.into(), help: None }
+    }
+
+    /// Adds the way out.
+    #[must_use]
+    pub fn with_help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.message)?;
+        self.help.iter().try_for_each(|help| write!(f, "\n  help: {help}"))
+    }
+}
+
+impl std::error::Error for Error {}

@@ -1,0 +1,178 @@
+//! What happens to the farm.
+
+use serde::{Deserialize, Serialize};
+use tessera_engine::part::Rect;
+
+use super::{Incarnation, JobId, LeaseId, PolicyId};
+use crate::schedule::{Assign, NodeId, Plan, Probe, Split};
+
+/// What the core needs to know of a job; the picture itself is not its business.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JobSpec {
+    /// Name for people.
+    pub name: String,
+    /// Columns of the frame.
+    pub width: u32,
+    /// Rows of the frame.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u64,
+    /// How costs are learned.
+    pub probe: Probe,
+    /// How the frame is split.
+    pub split: Split,
+    /// How parts are assigned.
+    pub assign: Assign,
+    /// Nodes to wait for before the probe (for at most the stated limit): 1 or more.
+    pub min_nodes: u32,
+}
+
+/// What a node says of itself when it joins.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NodeInfo {
+    /// The name in its certificate.
+    pub name: String,
+    /// Rendering threads.
+    pub lanes: u32,
+    /// Version and engine revision.
+    pub build: String,
+    /// Where it connected from.
+    pub address: String,
+}
+
+/// An answer of a job's own policy.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Answer {
+    /// To [`super::Question::Split`].
+    Split(Vec<Rect>),
+    /// To [`super::Question::Assign`] and [`super::Question::Redistribute`].
+    Plan(Plan),
+}
+
+/// Everything that can happen to the farm. Each is journaled before its commands are carried out where it matters for recovery.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Event {
+    /// A job was accepted; its description and assets are stored.
+    JobSubmitted {
+        /// The job's new id, above all earlier ones.
+        job: JobId,
+        /// What is to be done.
+        spec: JobSpec,
+    },
+    /// Someone no longer wants the job.
+    JobCancelled {
+        /// The job.
+        job: JobId,
+        /// Who, or why.
+        reason: String,
+    },
+    /// A node connected and proved its certificate.
+    NodeJoined {
+        /// Its id (the same name has the same id).
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// What it says of itself.
+        info: NodeInfo,
+    },
+    /// A node rendered the canary part; the shell compared hashes.
+    NodeProved {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// Nothing, or why it gets no work.
+        verdict: Result<(), String>,
+    },
+    /// Any authenticated sign of life.
+    NodeHeard {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+    },
+    /// A node's connection closed (it said goodbye, or the transport gave up).
+    NodeLeft {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// Why.
+        reason: String,
+    },
+    /// A node has fetched and compiled a job's scene, or could not.
+    Prepared {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// The job.
+        job: JobId,
+        /// Nothing, or why it cannot render this job.
+        result: Result<(), String>,
+    },
+    /// A node has measured probe cells.
+    Probed {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// The job.
+        job: JobId,
+        /// Index of each cell and the seconds that one lane took for one sample of one pixel in it, on the average.
+        cells: Vec<(u32, f64)>,
+    },
+    /// A node delivered a part: the shell holds its pixels, checked against their hash.
+    Rendered {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// The job.
+        job: JobId,
+        /// The attempt.
+        lease: LeaseId,
+        /// Hash of the pixels.
+        hash: [u8; 32],
+        /// Seconds that the lane took.
+        seconds: f64,
+    },
+    /// A node could not render a part.
+    RenderFailed {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// The job.
+        job: JobId,
+        /// The attempt.
+        lease: LeaseId,
+        /// Why.
+        reason: String,
+    },
+    /// The pixels of an attempt are on disk.
+    Committed {
+        /// The job.
+        job: JobId,
+        /// The attempt.
+        lease: LeaseId,
+    },
+    /// A job's own policy answered, or failed with a message that names its place in the script.
+    PolicyAnswered {
+        /// The question.
+        id: PolicyId,
+        /// The answer.
+        answer: Result<Answer, String>,
+    },
+    /// The output files stand, or could not be written.
+    Assembled {
+        /// The job.
+        job: JobId,
+        /// Nothing, or why not.
+        result: Result<(), String>,
+    },
+    /// The coordinator was started anew and has replayed its journal; parts whose pixels were found on disk are committed by now.
+    Restarted,
+    /// Nothing but time has passed: send it when [`super::Farm::next_deadline`] is reached.
+    Tick,
+}

@@ -1,0 +1,91 @@
+//! What always holds, whatever happens. The simulator checks it after every step.
+
+use std::collections::BTreeMap;
+
+use super::job::{Job, Phase};
+use super::part::Place;
+use super::{Farm, LeaseId};
+use crate::schedule::{NodeId, PartId};
+
+impl Farm {
+    /// Checks the farm's books.
+    ///
+    /// # Errors
+    /// What does not agree.
+    pub fn check_invariants(&self) -> Result<(), String> {
+        let open = self.jobs.values().filter(|job| !matches!(job.phase, Phase::Waiting | Phase::Over(_)));
+        for job in open {
+            if Some(job.id) != self.running {
+                return Err(format!("job {} has begun but does not run", job.id.0));
+            }
+            let void = job.leases.values().find(|lease| !self.nodes.get(&lease.node).is_some_and(|node| node.lives(lease.incarnation)));
+            if let Some(lease) = void {
+                return Err(format!("part {} is leased to a life of node {} that is over", lease.part.0, lease.node.0));
+            }
+            job.check_places().and_then(|()| job.check_leases()).map_err(|wrong| format!("job {}: {wrong}", job.id.0))?;
+        }
+        match self.next_deadline() {
+            Some(at) if self.turn.ticks && at <= self.turn.now => Err("a deadline has struck and is still there".into()),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Farm {
+    /// What distinguishes the state of another farm from that of this one, if anything does; clocks aside.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let node = self.nodes.iter().find(|(id, node)| other.nodes.get(id) != Some(node));
+        let job = self.jobs.iter().find(|(id, job)| other.jobs.get(id) != Some(job));
+        let node = node.map(|(id, node)| format!("{node:?} against {:?}", other.nodes.get(id)));
+        let job = job.map(|(id, job)| format!("{job:?} against {:?}", other.jobs.get(id)));
+        let names = (self.turn.last_name, self.running, self.nodes.len(), self.jobs.len());
+        let others = (other.turn.last_name, other.running, other.nodes.len(), other.jobs.len());
+        node.or(job).or_else(|| (names != others).then(|| format!("{names:?} against {others:?}")))
+    }
+}
+
+impl Job {
+    /// Every part is in one place: loose, in one queue, with one lease that counts, or delivered.
+    fn check_places(&self) -> Result<(), String> {
+        let queued = |(id, member): (&NodeId, &super::job::Member)| member.queue.iter().map(|part| (*part, *id)).collect::<Vec<_>>();
+        let queued: Vec<(PartId, NodeId)> = self.members.iter().flat_map(queued).collect();
+        let queue_of: BTreeMap<PartId, NodeId> = queued.iter().copied().collect();
+        expect(queued.len() == queue_of.len(), "a part waits in two queues")?;
+        let (mut committed, mut leased, mut loose) = (0, 0, 0);
+        for part in &self.parts {
+            let agrees = match part.place {
+                Place::Loose => self.loose.contains(&part.id),
+                Place::Queued(node) => queue_of.get(&part.id) == Some(&node),
+                Place::Leased(lease) => self.leases.get(&lease).is_some_and(|of| of.part == part.id),
+                Place::Committing(lease) => self.committing.get(&lease) == Some(&part.id),
+                Place::Committed(_) => true,
+            };
+            expect(agrees, &format!("part {} is not where the books say: {:?}", part.id.0, part.place))?;
+            committed += usize::from(part.committed_by().is_some());
+            leased += usize::from(matches!(part.place, Place::Leased(_)));
+            loose += usize::from(part.place == Place::Loose);
+        }
+        expect(committed == self.committed, "parts on disk are miscounted")?;
+        expect(loose == self.loose.len(), "a part that has a place is called loose")?;
+        let held: usize = self.members.values().map(|member| member.held.len()).sum();
+        expect(held == leased, "nodes hold other leases than parts say")?;
+        expect(leased + committed + loose + queued.len() + self.committing.len() == self.parts.len(), "parts do not add up")
+    }
+
+    /// Every lease belongs to a part that is not delivered yet, and what a node holds is its own.
+    fn check_leases(&self) -> Result<(), String> {
+        for (id, lease) in &self.leases {
+            expect(!self.part(lease.part).is_delivered(), &format!("lease {} is open although its part is delivered", id.0))?;
+        }
+        let own = |id: &NodeId, lease: &LeaseId| {
+            self.leases.get(lease).is_some_and(|of| of.node == *id && self.part(of.part).place == Place::Leased(*lease))
+        };
+        self.members.iter().try_for_each(|(id, member)| {
+            expect(member.held.iter().all(|lease| own(id, lease)), &format!("node {} holds a lease that is not its own", id.0))
+        })
+    }
+}
+
+fn expect(holds: bool, wrong: &str) -> Result<(), String> {
+    if holds { Ok(()) } else { Err(wrong.to_owned()) }
+}

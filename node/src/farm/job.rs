@@ -1,0 +1,197 @@
+//! A job: its phase, its nodes, its parts and its leases.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use tessera_engine::part::SampleRange;
+
+use super::gathering::Gathering;
+use super::log::Log;
+use super::node::Nodes;
+use super::part::{Lease, PartState};
+use super::planning::Pending;
+use super::probing::{Pricing, Probing};
+use super::turn::Turn;
+use super::{FarmConfig, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
+use crate::schedule::{CostMap, NodeId, NodePower, PartId};
+
+/// How far a job is.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Phase {
+    Waiting,
+    Gathering(Gathering),
+    Probing(Probing),
+    Splitting,
+    Assigning,
+    Rendering,
+    Assembling,
+    Over(Outcome),
+}
+
+/// How far a node is with a job.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Stage {
+    /// It compiles the scene, since then.
+    Preparing(Duration),
+    /// It cannot render this job.
+    Failed(String),
+    /// It can, but how fast is not known yet.
+    Prepared,
+    /// It gets work.
+    Measured,
+    /// It is lost.
+    Away,
+}
+
+/// A node in a job.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Member {
+    pub incarnation: Incarnation,
+    pub info: NodeInfo,
+    pub stage: Stage,
+    /// Speed of a lane, relative to the reference, once it is known.
+    pub speed: Option<f64>,
+    pub probed: Vec<(u32, f64)>,
+    /// Seconds that its latest parts took, over those predicted.
+    pub pace: f64,
+    /// Parts that wait for it, hardest first (on the film's order under the naive policy).
+    pub queue: VecDeque<PartId>,
+    /// Attempts that it holds and that count, in the order in which they were handed out.
+    pub held: Vec<LeaseId>,
+}
+
+impl Member {
+    /// Throughput, once it is known (see [`crate::schedule::evaluate`]).
+    pub fn power(&self) -> Option<f64> {
+        self.speed.map(|speed| speed * f64::from(self.info.lanes.max(1)))
+    }
+
+    pub fn capacity(&self, config: &FarmConfig) -> usize {
+        self.info.lanes.max(1) as usize * (1 + config.prefetch_per_lane)
+    }
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Job {
+    pub id: JobId,
+    pub spec: JobSpec,
+    pub phase: Phase,
+    pub members: BTreeMap<NodeId, Member>,
+    pub pricing: Pricing,
+    pub costs: CostMap,
+    pub parts: Vec<PartState>,
+    /// Parts with no node.
+    pub loose: BTreeSet<PartId>,
+    pub leases: BTreeMap<LeaseId, Lease>,
+    /// Attempts whose pixels are on their way to the disk, with their parts.
+    pub committing: BTreeMap<LeaseId, PartId>,
+    pub committed: usize,
+    /// Cost of all parts, and of those on disk.
+    pub cost: (f64, f64),
+    /// Number of parts; they themselves are forgotten some time after the end.
+    pub split_into: usize,
+    /// The question to the job's own policy that is not answered yet.
+    pub question: Option<Pending>,
+    /// Since when no node is there that has, or may get, work.
+    pub deserted: Option<Duration>,
+    /// When nodes with nothing to do look again for something to take.
+    pub reconsider: Option<Duration>,
+    pub log: Log,
+}
+
+impl Job {
+    pub fn new(id: JobId, spec: JobSpec, now: Duration) -> Self {
+        Self {
+            id,
+            spec,
+            phase: Phase::Waiting,
+            members: BTreeMap::new(),
+            pricing: Pricing::Unknown,
+            costs: CostMap::default(),
+            parts: Vec::new(),
+            loose: BTreeSet::new(),
+            leases: BTreeMap::new(),
+            committing: BTreeMap::new(),
+            committed: 0,
+            cost: (0.0, 0.0),
+            split_into: 0,
+            reconsider: None,
+            question: None,
+            deserted: None,
+            log: Log { submitted: now, ..Log::default() },
+        }
+    }
+
+    pub fn outcome(&self) -> Option<&Outcome> {
+        if let Phase::Over(outcome) = &self.phase { Some(outcome) } else { None }
+    }
+
+    /// Forgets all but what the status page shows.
+    pub fn forget_details(&mut self) {
+        self.parts = Vec::new();
+        self.members = BTreeMap::new();
+        self.costs = CostMap::default();
+        self.log.events = Vec::new();
+    }
+
+    /// Does all that has become possible.
+    pub fn advance(&mut self, turn: &mut Turn, nodes: &Nodes) {
+        self.watch_desertion(turn, nodes);
+        self.watch_preparation(turn);
+        self.watch_question(turn, nodes);
+        self.advance_gathering(turn, nodes);
+        self.advance_probing(turn, nodes);
+        self.advance_planning(turn, nodes);
+        self.advance_rendering(turn, nodes);
+    }
+
+    pub fn next_deadline(&self, config: &FarmConfig) -> Option<Duration> {
+        let preparing = self.members.values().filter_map(|member| match member.stage {
+            Stage::Preparing(since) => Some(since + config.prepare_timeout),
+            _ => None,
+        });
+        let phase = match &self.phase {
+            Phase::Gathering(gathering) => gathering.next_deadline(),
+            Phase::Probing(probing) => probing.deadline,
+            _ => None,
+        };
+        let deserted = self.deserted.map(|since| since + config.no_node_timeout);
+        let question = self.question.as_ref().map(|question| question.deadline);
+        preparing.chain(phase).chain(deserted).chain(question).chain(self.reconsider).min()
+    }
+
+    /// Nodes that get work now: there, with the scene, and measured.
+    pub fn usable(&self, nodes: &Nodes, id: NodeId) -> bool {
+        self.members.get(&id).is_some_and(|member| member.stage == Stage::Measured) && nodes.get(&id).is_some_and(|node| node.is_ready())
+    }
+
+    /// Usable nodes with their power, most powerful first.
+    pub fn usable_powers(&self, nodes: &Nodes) -> Vec<NodePower> {
+        let mut powers = self.powers();
+        powers.retain(|node| self.usable(nodes, node.id));
+        crate::schedule::evaluate::rank(&mut powers);
+        powers
+    }
+
+    /// All measured nodes with their power, in order of their ids.
+    pub fn powers(&self) -> Vec<NodePower> {
+        let power = |(id, member): (&NodeId, &Member)| {
+            let (name, lanes) = (member.info.name.clone(), member.info.lanes);
+            member.power().map(|power| NodePower { id: *id, name, lanes, power })
+        };
+        self.members.iter().filter_map(power).collect()
+    }
+
+    /// The samples of a whole part.
+    pub fn all_samples(&self) -> SampleRange {
+        SampleRange { first: 0, count: self.spec.samples }
+    }
+
+    pub fn part(&self, id: PartId) -> &PartState {
+        &self.parts[id.0 as usize]
+    }
+
+    pub fn part_mut(&mut self, id: PartId) -> &mut PartState {
+        &mut self.parts[id.0 as usize]
+    }
+}

@@ -1,0 +1,150 @@
+//! The farm's core: a state machine without clocks, sockets, disks, threads or Lua. `step(now, event)` puts out commands.
+//!
+//! A job goes through phases, a file each: it waits its turn (`running`), nodes gather and compile its scene (`gathering`), costs are measured
+//! (`probing`), it is split and assigned (`planning`), its parts are rendered (`rendering`, `stealing`, `redistribution`), and it ends (`ending`).
+//! Nodes come and go at any time (`presence`). Events change what is known; then `Job::advance` does all that has become possible.
+
+mod command;
+mod config;
+mod ending;
+mod event;
+mod gathering;
+mod id;
+mod invariants;
+mod job;
+mod log;
+mod node;
+mod part;
+mod planning;
+mod presence;
+mod probing;
+mod record;
+mod redistribution;
+mod rendering;
+mod stealing;
+#[cfg(test)]
+mod tests;
+mod turn;
+
+use std::{collections::BTreeMap, time::Duration};
+
+pub use command::{Command, DiscardReason, Outcome, Question, ToNode};
+pub use config::FarmConfig;
+pub use event::{Answer, Event, JobSpec, NodeInfo};
+pub use id::{Incarnation, JobId, LeaseId, PolicyId};
+pub use node::{NodeSnapshot, NodeState};
+pub use record::{JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
+
+use job::Job;
+use node::Nodes;
+use turn::Turn;
+
+/// The farm: nodes, and jobs of which one runs at a time, in order of submission.
+///
+/// The shell calls [`Self::step`] with every event, in order, and carries out the commands in order; it sends [`Event::Tick`] when
+/// [`Self::next_deadline`] is reached. Deadlines strike in ticks alone. The same events at the same times give the same commands and the same state.
+#[derive(Clone, Debug)]
+pub struct Farm {
+    turn: Turn,
+    nodes: Nodes,
+    jobs: BTreeMap<JobId, Job>,
+    running: Option<JobId>,
+}
+
+impl Farm {
+    /// A farm without nodes and jobs.
+    pub fn new(config: FarmConfig) -> Self {
+        Self { turn: Turn::new(config), nodes: Nodes::new(), jobs: BTreeMap::new(), running: None }
+    }
+
+    /// Takes note of an event at the moment `now` (since any fixed moment; it never goes back) and says what is to be done.
+    pub fn step(&mut self, now: Duration, event: Event) -> Vec<Command> {
+        self.turn.now = self.turn.now.max(now);
+        self.turn.at = now;
+        self.turn.ticks = event == Event::Tick;
+        if let Event::NodeHeard { node, incarnation } = event
+            && !self.is_suspected(node)
+        {
+            self.node_heard(node, incarnation); // by far the most frequent event, and it makes nothing possible
+            return Vec::new();
+        }
+        match event {
+            Event::JobSubmitted { job, spec } => self.job_submitted(job, spec),
+            Event::JobCancelled { job, reason } => self.job_cancelled(job, reason),
+            Event::NodeJoined { node, incarnation, info } => self.node_joined(node, incarnation, info),
+            Event::NodeProved { node, incarnation, verdict } => self.node_proved(node, incarnation, verdict),
+            Event::NodeHeard { node, incarnation } => _ = self.node_heard(node, incarnation),
+            Event::NodeLeft { node, incarnation, reason } => self.node_left(node, incarnation, &reason),
+            Event::Restarted => self.restarted(),
+            Event::Tick => self.watch_nodes(),
+            Event::PolicyAnswered { id, answer } => self.with_running(|job, turn, nodes| job.policy_answered(turn, nodes, id, answer)),
+            Event::Prepared { node, incarnation, job, result } => {
+                self.of_node(node, incarnation, job, |job, turn, nodes| job.prepared(turn, nodes, node, result))
+            }
+            Event::Probed { node, incarnation, job, cells } => {
+                self.of_node(node, incarnation, job, |job, _, _| job.probed(node, &cells));
+            }
+            Event::Rendered { node, incarnation, job, lease, hash, seconds } => {
+                self.rendered(node, incarnation, job, lease, hash, seconds);
+            }
+            Event::RenderFailed { node, incarnation, job, lease, reason } => {
+                self.of_node(node, incarnation, job, |job, turn, nodes| job.render_failed(turn, nodes, node, lease, &reason));
+            }
+            Event::Committed { job, lease } => self.with_job(job, |job, turn, _| job.committed(turn, lease)),
+            Event::Assembled { job, result } => self.with_job(job, |job, turn, nodes| job.assembled(turn, nodes, result)),
+        }
+        self.advance();
+        std::mem::take(&mut self.turn.commands)
+    }
+
+    /// When the next [`Event::Tick`] is due; `None` while nothing but events can change anything.
+    pub fn next_deadline(&self) -> Option<Duration> {
+        let job = self.running.and_then(|id| self.jobs.get(&id)).and_then(|job| job.next_deadline(&self.turn.config));
+        self.next_silence().into_iter().chain(job).min()
+    }
+
+    /// The farm's clock: the latest moment that it was told.
+    pub fn now(&self) -> Duration {
+        self.turn.now
+    }
+
+    /// Whether a node is suspected: then a sign of life changes more than a time.
+    pub fn is_suspected(&self, node: crate::schedule::NodeId) -> bool {
+        self.nodes.get(&node).is_some_and(|node| node.state == NodeState::Suspected)
+    }
+
+    /// Lets the running job do what it can, then the next one.
+    fn advance(&mut self) {
+        loop {
+            self.with_running(|job, turn, nodes| job.advance(turn, nodes));
+            if self.running.and_then(|id| self.jobs.get(&id)).is_some_and(|job| job.outcome().is_none()) || !self.start_next() {
+                return;
+            }
+        }
+    }
+
+    fn with_job(&mut self, id: JobId, act: impl FnOnce(&mut Job, &mut Turn, &Nodes)) {
+        if let Some(job) = self.jobs.get_mut(&id).filter(|job| job.outcome().is_none()) {
+            act(job, &mut self.turn, &self.nodes);
+        }
+    }
+
+    fn with_running(&mut self, act: impl FnOnce(&mut Job, &mut Turn, &Nodes)) {
+        if let Some(id) = self.running {
+            self.with_job(id, act);
+        }
+    }
+
+    /// Handles what a node says of a job; it is a sign of life too. A life that is over has nothing to say.
+    fn of_node(
+        &mut self,
+        node: crate::schedule::NodeId,
+        incarnation: Incarnation,
+        job: JobId,
+        act: impl FnOnce(&mut Job, &mut Turn, &Nodes),
+    ) {
+        if self.node_heard(node, incarnation) {
+            self.with_job(job, act);
+        }
+    }
+}

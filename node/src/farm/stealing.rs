@@ -1,0 +1,135 @@
+//! Under `earliest_finish`, a node that runs out takes a part from the node that is expected to finish last.
+//!
+//! Expected times rest on the probe, corrected by how fast a node's latest parts really were. A part moves only if it is then expected to be done
+//! before the other node is done with all it has. Attempts that no lane can have begun are called back and move too.
+
+use std::time::Duration;
+
+use super::job::{Job, Member};
+use super::node::Nodes;
+use super::part::Place;
+use super::turn::Turn;
+use super::{LeaseId, part::Lease};
+use crate::limits::STEAL_INTERVAL;
+use crate::manifest::AttemptOutcome;
+use crate::schedule::{NodeId, PartId};
+
+/// How much a part's time tells of the next one's.
+const PACE_WEIGHT: f64 = 0.3;
+
+/// Bounds of the correction by real times.
+const PACE_RANGE: (f64, f64) = (0.05, 50.0);
+
+/// A lane that is overdue by some time is expected to need this share of it more.
+const OVERDUE: f64 = 0.5;
+
+impl Member {
+    /// Cost that one lane does in a second, by the latest parts.
+    fn lane_speed(&self) -> f64 {
+        self.speed.unwrap_or(1.0) / self.pace
+    }
+
+    fn lanes(&self) -> usize {
+        self.info.lanes.max(1) as usize
+    }
+
+    /// Takes note of how long a part really took.
+    pub fn note_pace(&mut self, cost: f64, seconds: f64) {
+        let predicted = cost / self.speed.unwrap_or(1.0);
+        if predicted > 0.0 && seconds.is_finite() {
+            let pace = (1.0 - PACE_WEIGHT) * self.pace + PACE_WEIGHT * (seconds / predicted);
+            self.pace = pace.clamp(PACE_RANGE.0, PACE_RANGE.1);
+        }
+    }
+}
+
+/// What a node may lose.
+struct Victim {
+    id: NodeId,
+    /// Seconds until it is done with all it has.
+    finish: f64,
+}
+
+impl Job {
+    /// Lets nodes with room take parts from others; asks to be woken while some find nothing that is worth it.
+    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &Nodes, ids: &[NodeId]) {
+        self.reconsider = None;
+        let thieves: Vec<NodeId> = ids.iter().copied().filter(|id| self.has_room(turn, nodes, *id)).collect();
+        if thieves.is_empty() {
+            return;
+        }
+        let mut victims: Vec<Victim> = ids.iter().filter_map(|id| self.victim(turn.now, *id)).collect();
+        for thief in thieves {
+            while self.has_room(turn, nodes, thief) && self.steal_one(turn, nodes, thief, &mut victims) {}
+        }
+        if !victims.is_empty() {
+            self.reconsider = Some(turn.now + STEAL_INTERVAL);
+        }
+    }
+
+    fn steal_one(&mut self, turn: &mut Turn, nodes: &Nodes, thief: NodeId, victims: &mut Vec<Victim>) -> bool {
+        let Some(at) =
+            (0..victims.len()).filter(|i| victims[*i].id != thief).max_by(|a, b| victims[*a].finish.total_cmp(&victims[*b].finish))
+        else {
+            return false;
+        };
+        let victim = &victims[at];
+        let Some(part) = self.loot(turn.now, thief, victim) else { return false };
+        let from = victim.id;
+        self.take_away(turn, nodes, from, part);
+        self.hand_over(turn, nodes, thief, part);
+        match self.victim(turn.now, from) {
+            Some(victim) => victims[at] = victim,
+            None => _ = victims.swap_remove(at),
+        }
+        true
+    }
+
+    /// The hardest part that the thief would finish before the victim finishes all.
+    fn loot(&self, now: Duration, thief: NodeId, victim: &Victim) -> Option<PartId> {
+        let (member, from) = (self.members.get(&thief)?, self.members.get(&victim.id)?);
+        let idle = member.held.len() < member.lanes();
+        let delay = if idle { 0.0 } else { self.held_cost(now, member) / (member.lane_speed() * member.lanes() as f64) };
+        let pays = |part: &PartId| {
+            let state = self.part(*part);
+            delay + state.cost / member.lane_speed() < victim.finish && !state.failed_on(thief)
+        };
+        let queued = from.queue.iter().copied().find(pays);
+        queued.or_else(|| idle.then(|| self.not_begun(from)).flatten().map(|(_, lease)| lease.part).filter(pays))
+    }
+
+    fn take_away(&mut self, turn: &mut Turn, nodes: &Nodes, from: NodeId, part: PartId) {
+        if let Place::Leased(lease) = self.part(part).place {
+            self.call_back(turn, nodes, lease);
+            self.close(turn, lease, AttemptOutcome::Cancelled, "another node was free");
+        }
+        if let Some(member) = self.members.get_mut(&from) {
+            member.queue.retain(|queued| *queued != part);
+        }
+    }
+
+    /// The last attempt that a node holds, if no lane can have begun it.
+    fn not_begun(&self, member: &Member) -> Option<(LeaseId, &Lease)> {
+        let last = member.held.last().filter(|_| member.held.len() > member.lanes())?;
+        self.leases.get(last).filter(|lease| lease.begun.is_none()).map(|lease| (*last, lease))
+    }
+
+    /// A node as a victim, if there is something to take.
+    fn victim(&self, now: Duration, id: NodeId) -> Option<Victim> {
+        let member = self.members.get(&id)?;
+        let last = member.queue.back().copied().or_else(|| self.not_begun(member).map(|(_, lease)| lease.part))?;
+        let cost = self.held_cost(now, member) + member.queue.iter().map(|part| self.part(*part).cost).sum::<f64>();
+        let (last, speed) = (self.part(last).cost, member.lane_speed());
+        Some(Victim { id, finish: (cost - last).max(0.0) / (speed * member.lanes() as f64) + last / speed })
+    }
+
+    /// Cost that is left of what a node holds.
+    fn held_cost(&self, now: Duration, member: &Member) -> f64 {
+        let left = |lease: &Lease| {
+            let done = lease.begun.map_or(0.0, |begun| now.saturating_sub(begun).as_secs_f64() * member.lane_speed());
+            let left = self.part(lease.part).cost - done;
+            if left >= 0.0 { left } else { -left * OVERDUE }
+        };
+        member.held.iter().filter_map(|lease| self.leases.get(lease)).map(left).sum()
+    }
+}

@@ -1,0 +1,49 @@
+//! Textures.
+
+use mlua::Value;
+use tessera_engine::description::{ColorSpace, Texture, Wrap};
+
+use super::{Form, Function, model::asset};
+use crate::job::{
+    handle::Thing,
+    keys::{Field, Keys, POSITIVE},
+};
+
+pub const FUNCTIONS: &[Function] = &[
+    Function { path: "checker", form: Form::Table, keys: &["even", "odd", "size", "name"], make: checker },
+    Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "name"], make: image },
+];
+
+fn checker(keys: &Keys) -> mlua::Result<Value> {
+    let even = keys.or("even", [0.8; 3], |field| field.color(1.0))?;
+    let odd = keys.or("odd", [0.2; 3], |field| field.color(1.0))?;
+    let size = keys.or("size", 1.0, |field| field.number(POSITIVE))?;
+    keys.make(|_| Thing::Texture(Texture::Checker { even, odd, size }))
+}
+
+fn image(keys: &Keys) -> mlua::Result<Value> {
+    let file = keys.required("file")?;
+    let name = file.text()?;
+    let ending = name.rsplit_once('.').map_or(String::new(), |(_, ending)| ending.to_ascii_lowercase());
+    if !matches!(ending.as_str(), "png" | "jpg" | "jpeg" | "hdr") {
+        return Err(file.wrong("an image file (.png, .jpg or .hdr)").into());
+    }
+    // Radiance files hold linear numbers; the others are coded for displays.
+    let usual = if ending == "hdr" { ColorSpace::Linear } else { ColorSpace::Srgb };
+    let color_space = keys.or("color_space", usual, |field| field.choice(&[("srgb", ColorSpace::Srgb), ("linear", ColorSpace::Linear)]))?;
+    let wrap = keys.or("wrap", [Wrap::Repeat; 2], wrap)?;
+    let (_, id) = asset(&file, &name)?;
+    keys.make(|source| Thing::Texture(Texture::Image { file: id, color_space, wrap, source }))
+}
+
+/// One word for both directions, or a list of two.
+fn wrap(field: Field) -> mlua::Result<[Wrap; 2]> {
+    let word = |field: &Field| field.choice(&[("repeat", Wrap::Repeat), ("mirror", Wrap::Mirror), ("clamp", Wrap::Clamp)]);
+    if !field.value.is_table() {
+        return word(&field).map(|wrap| [wrap; 2]);
+    }
+    match field.list()?.as_slice() {
+        [u, v] => Ok([word(u)?, word(v)?]),
+        _ => Err(field.wrong("a word or a list of two words, for u and v").into()),
+    }
+}

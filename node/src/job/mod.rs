@@ -1,0 +1,27 @@
+//! Job scripts: the sandbox, the Lua API, policies as callables, and the description that comes out.
+//!
+//! A script is run twice: where it is submitted ([`load`]), for its description and assets; and, if a policy is one of its functions, on the
+//! coordinator ([`Policies`]), from its bundle and without files.
+
+mod api;
+mod assemble;
+mod compile;
+mod context;
+mod description;
+mod evaluate;
+mod fault;
+mod handle;
+mod keys;
+mod library;
+mod load;
+mod modules;
+mod place;
+mod policy;
+mod sandbox;
+
+pub use description::{JobDescription, Output, PixelType, ScriptBundle};
+pub use load::{LoadedJob, load};
+pub use policy::Policies;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,209 @@
+//! What survives the coordinator: events, and the pixels of parts.
+//!
+//! The core's thread asks a [`Filter`] what of an event is to be kept; the thread of the disk owns the [`Journal`], so that the core never waits for
+//! the disk.
+//!
+//! Events stand in a database (redb) in the order in which the farm took them; a replay through the same `step` reaches the same state and reads no
+//! pixels. Pixels stand in segments, append-only files of checksummed records; a torn tail is cut off when a segment is opened.
+
+mod filter;
+mod segment;
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::Path;
+use std::time::Duration;
+
+use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+
+pub use filter::Filter;
+use segment::Segment;
+
+use crate::error::{Error, ExitCode, Result};
+use crate::farm::{Event, Farm, FarmConfig, JobId, LeaseId};
+use crate::limits::JOURNAL_EVENTS;
+use crate::schedule::PartId;
+
+/// Number of an event to the farm's clock in nanoseconds and the event in postcard coding.
+const EVENTS: TableDefinition<u64, (u64, &[u8])> = TableDefinition::new("events");
+
+/// The journal of one coordinator, in a folder of its own.
+pub struct Journal {
+    database: Database,
+    next: u64,
+    pending: Vec<(Duration, Event)>,
+    pixels: BTreeMap<JobId, Segment>,
+    folder: std::path::PathBuf,
+}
+
+/// What a journal remembers.
+pub struct Recovered {
+    /// The farm as it was. Its clock tells when; a coordinator's clock goes on from there.
+    pub farm: Farm,
+    /// Events that were replayed.
+    pub events: u64,
+}
+
+impl Journal {
+    /// Opens the journal in a folder, or begins one, and replays it. After it, the coordinator steps through one [`Event::Committed`] for every part that
+    /// [`Self::stored`] names and the farm does not call committed, and then through [`Event::Restarted`].
+    ///
+    /// # Errors
+    /// When files cannot be read or written, or when another process holds the journal.
+    ///
+    /// A long journal of jobs that are all over is begun anew: what came of them is in their manifests.
+    pub fn open(folder: &Path, config: FarmConfig) -> Result<(Self, Recovered)> {
+        std::fs::create_dir_all(folder).map_err(|error| failed(folder, "make the folder", &error))?;
+        let path = folder.join("events.redb");
+        let database = Database::create(&path).map_err(|error| match error {
+            redb::DatabaseError::DatabaseAlreadyOpen => failed(&path, "open the journal", "another coordinator uses it")
+                .with_help("end that one, or choose another folder with --data"),
+            error => failed(&path, "open the journal", &error),
+        })?;
+        let mut journal = Self { database, next: 0, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
+        let mut farm = Farm::new(config.clone());
+        let events = journal.replay(|at, event| _ = farm.step(at, event)).map_err(|error| failed(&path, "read the journal", &*error))?;
+        journal.next = events;
+        if events > JOURNAL_EVENTS && farm.jobs().iter().all(|job| job.outcome.is_some()) {
+            journal.clear().map_err(|error| failed(&path, "shorten the journal", &*error))?;
+            farm = Farm::new(config);
+        }
+        for job in farm.jobs().iter().filter(|job| job.outcome.is_none()) {
+            journal.segment(job.id)?;
+        }
+        Ok((journal, Recovered { farm, events }))
+    }
+
+    fn replay(&self, mut take: impl FnMut(Duration, Event)) -> Result<u64, Box<dyn std::error::Error + Send + Sync>> {
+        let reading = self.database.begin_read()?;
+        let table = match reading.open_table(EVENTS) {
+            Ok(table) => table,
+            Err(redb::TableError::TableDoesNotExist(_)) => return Ok(0),
+            Err(error) => return Err(error.into()),
+        };
+        let mut count = 0;
+        for entry in table.iter()? {
+            let (number, value) = entry?;
+            let (at, coded) = value.value();
+            take(Duration::from_nanos(at), postcard::from_bytes(coded)?);
+            count = number.value() + 1;
+        }
+        Ok(count)
+    }
+
+    /// Appends what [`Filter::admit`] says of events, in order. It is durable after the next [`Self::sync`].
+    pub fn append(&mut self, entries: Vec<(Duration, Event)>) {
+        self.pending.extend(entries);
+    }
+
+    /// Whether events wait for [`Self::sync`].
+    pub fn is_dirty(&self) -> bool {
+        !self.pending.is_empty()
+    }
+
+    /// Makes all events durable that were appended: one transaction, one wait for the disk.
+    ///
+    /// # Errors
+    /// When the disk is full or fails; the events are kept, and the next call tries again.
+    pub fn sync(&mut self) -> Result<()> {
+        if self.pending.is_empty() {
+            return Ok(());
+        }
+        self.write().map_err(|error| failed(&self.folder, "write the journal", &*error))?;
+        self.next += self.pending.len() as u64;
+        self.pending.clear();
+        Ok(())
+    }
+
+    /// Begins anew: nothing in the journal is needed any more.
+    fn clear(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        let writing = self.database.begin_write()?;
+        writing.delete_table(EVENTS)?;
+        writing.commit()?;
+        self.database.compact()?;
+        self.next = 0;
+        Ok(())
+    }
+
+    fn write(&self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        let writing = self.database.begin_write()?;
+        {
+            let mut table = writing.open_table(EVENTS)?;
+            for (number, (at, event)) in (self.next..).zip(&self.pending) {
+                table.insert(number, (u64::try_from(at.as_nanos())?, postcard::to_stdvec(event)?.as_slice()))?;
+            }
+        }
+        writing.commit()?;
+        Ok(())
+    }
+
+    /// Appends the pixels of an attempt. They are durable after the next [`Self::sync_pixels`]; only then may the farm be told that they are committed.
+    ///
+    /// # Errors
+    /// When the disk is full or fails; nothing is lost by trying again.
+    pub fn store_pixels(&mut self, job: JobId, part: PartId, lease: LeaseId, bytes: &[u8]) -> Result<()> {
+        let folder = self.folder.clone();
+        self.segment(job)?.append(part, lease, bytes).map_err(|error| failed(&folder, "store pixels", &error))
+    }
+
+    /// Waits until all pixels that were stored are on disk: one wait for all of them.
+    ///
+    /// # Errors
+    /// When the disk fails.
+    pub fn sync_pixels(&mut self) -> Result<()> {
+        let folder = self.folder.clone();
+        self.pixels.values_mut().try_for_each(Segment::sync).map_err(|error| failed(&folder, "store pixels", &error))
+    }
+
+    /// The pixels of an attempt, checked against their hash.
+    ///
+    /// # Errors
+    /// When they are not there, or are not what was stored.
+    pub fn read_pixels(&mut self, job: JobId, lease: LeaseId) -> Result<Vec<u8>> {
+        let folder = self.folder.clone();
+        self.segment(job)?.read(lease).map_err(|error| failed(&folder, &format!("read the pixels of lease {}", lease.0), &error))
+    }
+
+    /// Attempts of a job whose pixels are on disk, with their parts.
+    ///
+    /// # Errors
+    /// When the segment cannot be read.
+    pub fn stored(&mut self, job: JobId) -> Result<Vec<(LeaseId, PartId)>> {
+        Ok(self.segment(job)?.stored())
+    }
+
+    /// Forgets the pixels of a job that is over.
+    ///
+    /// # Errors
+    /// When the file cannot be removed.
+    pub fn release_pixels(&mut self, job: JobId) -> Result<()> {
+        self.pixels.remove(&job);
+        let path = self.path(job);
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(failed(&path, "remove pixels", &error)),
+            _ => Ok(()),
+        }
+    }
+
+    fn segment(&mut self, job: JobId) -> Result<&mut Segment> {
+        let path = self.path(job);
+        match self.pixels.entry(job) {
+            std::collections::btree_map::Entry::Occupied(entry) => Ok(entry.into_mut()),
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                let segment = Segment::open(&path).map_err(|error| failed(&path, "open pixels", &error))?;
+                Ok(entry.insert(segment))
+            }
+        }
+    }
+
+    fn path(&self, job: JobId) -> std::path::PathBuf {
+        self.folder.join(format!("job-{}.pixels", job.0))
+    }
+}
+
+fn failed(path: &Path, what: &str, error: &(impl std::fmt::Display + ?Sized)) -> Error {
+    Error::new(ExitCode::File, format!("{}: cannot {what}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,168 @@
+use super::*;
+use crate::farm::{Command, Incarnation, JobSpec, NodeInfo, ToNode};
+use crate::schedule::{Assign, CostMap, NodeId, Probe, Split};
+
+fn spec() -> JobSpec {
+    let costs = CostMap { cell: 64, columns: 1, rows: 1, seconds_per_pixel: vec![1.0] };
+    JobSpec {
+        name: "journaled".into(),
+        width: 64,
+        height: 64,
+        samples: 1,
+        probe: Probe::Known { costs, powers: BTreeMap::new() },
+        split: Split::Grid { width: 16, height: 16 },
+        assign: Assign::EarliestFinish,
+        min_nodes: 1,
+    }
+}
+
+/// One node up to its first parts, with heartbeats between.
+fn life() -> Vec<(Duration, Event)> {
+    let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(1));
+    let info = NodeInfo { name: "n".into(), lanes: 2, build: "b".into(), address: "a".into() };
+    let mut events = vec![
+        Event::JobSubmitted { job, spec: spec() },
+        Event::NodeJoined { node, incarnation, info },
+        Event::NodeHeard { node, incarnation },
+        Event::NodeProved { node, incarnation, verdict: Ok(()) },
+        Event::Tick,
+        Event::Prepared { node, incarnation, job, result: Ok(()) },
+    ];
+    for lease in 1..5 {
+        events.push(Event::Rendered { node, incarnation, job, lease: LeaseId(lease), hash: [1; 32], seconds: 1.0 });
+        events.push(Event::NodeHeard { node, incarnation });
+        events.push(Event::Committed { job, lease: LeaseId(lease) });
+    }
+    (1..).map(|i| Duration::from_millis(i * 100)).zip(events).collect()
+}
+
+#[test]
+fn a_replay_reaches_the_same_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut journal, recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    let (mut farm, mut filter) = (recovered.farm, Filter::default());
+    for (at, event) in life() {
+        journal.append(filter.admit(&farm, at, &event));
+        farm.step(at, event);
+        journal.sync().unwrap();
+    }
+    farm.step(Duration::from_secs(9), Event::Tick); // silence: never journaled, so not in the replay
+    drop(journal);
+    let (mut journal, mut recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    assert!(farm.difference(&recovered.farm).is_some());
+    let mut again = Farm::new(FarmConfig::default());
+    life().into_iter().for_each(|(at, event)| _ = again.step(at, event));
+    assert_eq!(again.jobs()[0].committed, 4);
+    // The last heartbeat was not written: no deadline struck after it. The next one tells the same.
+    for farm in [&mut again, &mut recovered.farm] {
+        farm.step(Duration::from_secs(2), Event::NodeHeard { node: NodeId(0), incarnation: Incarnation(7) });
+    }
+    assert_eq!(again.difference(&recovered.farm), None);
+    assert!(recovered.events < life().len() as u64, "heartbeats and idle ticks are left out");
+    // The journal goes on where it stopped.
+    let left = Event::NodeLeft { node: NodeId(0), incarnation: Incarnation(7), reason: "bye".into() };
+    for farm in [&mut again, &mut recovered.farm] {
+        farm.step(Duration::from_secs(3), left.clone());
+    }
+    journal.append(vec![(Duration::from_secs(3), left)]);
+    journal.sync().unwrap();
+    drop(journal);
+    assert_eq!(again.difference(&Journal::open(folder.path(), FarmConfig::default()).unwrap().1.farm), None);
+}
+
+#[test]
+fn two_coordinators_cannot_share_a_journal() {
+    let folder = tempfile::tempdir().unwrap();
+    let _first = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    let error = Journal::open(folder.path(), FarmConfig::default()).err().unwrap();
+    assert!(error.message.contains("cannot open the journal"), "{error}");
+}
+
+/// A job's pixels with three parts; where the last one begins, and the whole file.
+fn pixels(folder: &Path) -> (usize, Vec<u8>) {
+    let path = folder.join("job-1.pixels");
+    let mut segment = Segment::open(&path).unwrap();
+    segment.append(PartId(0), LeaseId(10), &[1, 2, 3]).unwrap();
+    segment.append(PartId(1), LeaseId(11), &[]).unwrap();
+    let last = std::fs::metadata(&path).unwrap().len() as usize;
+    segment.append(PartId(2), LeaseId(12), &[9; 40]).unwrap();
+    segment.sync().unwrap();
+    (last, std::fs::read(path).unwrap())
+}
+
+#[test]
+fn a_torn_tail_is_cut_wherever_it_is_torn() {
+    let folder = tempfile::tempdir().unwrap();
+    let (last, whole) = pixels(folder.path());
+    let path = folder.path().join("job-1.pixels");
+    for length in last..whole.len() {
+        std::fs::write(&path, &whole[..length]).unwrap();
+        let mut segment = Segment::open(&path).unwrap();
+        assert_eq!(segment.stored(), [(LeaseId(10), PartId(0)), (LeaseId(11), PartId(1))], "torn at {length}");
+        assert_eq!(std::fs::metadata(&path).unwrap().len() as usize, last);
+        assert!(segment.read(LeaseId(12)).is_err());
+        segment.append(PartId(2), LeaseId(13), &[7; 40]).unwrap();
+        drop(segment);
+        let mut segment = Segment::open(&path).unwrap();
+        assert_eq!(segment.read(LeaseId(10)).unwrap(), [1, 2, 3]);
+        assert_eq!(segment.read(LeaseId(13)).unwrap(), [7; 40]);
+    }
+}
+
+#[test]
+fn a_flipped_bit_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let (last, whole) = pixels(folder.path());
+    let path = folder.path().join("job-1.pixels");
+    for at in last..whole.len() {
+        let mut bad = whole.clone();
+        bad[at] ^= 0x10;
+        std::fs::write(&path, &bad).unwrap();
+        assert_eq!(Segment::open(&path).unwrap().stored().len(), 2, "byte {at}");
+    }
+    // Also after it was opened.
+    std::fs::write(&path, &whole).unwrap();
+    let mut segment = Segment::open(&path).unwrap();
+    let mut bad = whole;
+    bad[last - 60] ^= 1;
+    *bad.last_mut().unwrap() ^= 1;
+    std::fs::write(&path, &bad).unwrap();
+    assert!(segment.read(LeaseId(12)).unwrap_err().to_string().contains("not what was stored"));
+}
+
+#[test]
+fn pixels_come_back_and_go_with_their_job() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut journal, _) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    let job = JobId(3);
+    journal.store_pixels(job, PartId(5), LeaseId(1), b"first").unwrap();
+    journal.store_pixels(job, PartId(5), LeaseId(1), b"again").unwrap(); // a repeated commit changes nothing
+    journal.sync_pixels().unwrap();
+    assert_eq!(journal.read_pixels(job, LeaseId(1)).unwrap(), b"first");
+    assert_eq!(journal.stored(job).unwrap(), [(LeaseId(1), PartId(5))]);
+    journal.release_pixels(job).unwrap();
+    journal.release_pixels(job).unwrap();
+    assert!(journal.stored(job).unwrap().is_empty());
+}
+
+#[test]
+fn pixels_on_disk_are_not_rendered_again_after_a_crash_before_their_commit() {
+    let mut farm = Farm::new(FarmConfig::default());
+    let events = life();
+    let delivered = events.iter().position(|(_, event)| matches!(event, Event::Rendered { .. })).unwrap();
+    events[..=delivered].iter().for_each(|(at, event)| _ = farm.step(*at, event.clone()));
+    // Lost: the pixels were in memory. Kept: the journal's segment has them, and the coordinator says so before the restart.
+    let mut kept = farm.clone();
+    kept.step(Duration::from_secs(2), Event::Committed { job: JobId(1), lease: LeaseId(1) });
+    let orders = |farm: &mut Farm| -> usize {
+        farm.step(Duration::from_secs(2), Event::Restarted);
+        let (node, incarnation) = (NodeId(0), Incarnation(8));
+        let info = NodeInfo { name: "n".into(), lanes: 16, build: "b".into(), address: "a".into() };
+        let mut commands = farm.step(Duration::from_secs(2), Event::NodeJoined { node, incarnation, info });
+        commands.extend(farm.step(Duration::from_secs(2), Event::NodeProved { node, incarnation, verdict: Ok(()) }));
+        commands.extend(farm.step(Duration::from_secs(2), Event::Prepared { node, incarnation, job: JobId(1), result: Ok(()) }));
+        farm.check_invariants().unwrap();
+        commands.iter().filter(|command| matches!(command, Command::Send { message: ToNode::Render { .. }, .. })).count()
+    };
+    assert_eq!((orders(&mut farm), orders(&mut kept)), (16, 15));
+}

@@ -1,0 +1,223 @@
+//! Every bound of the program, in one place: what is not bounded here is not bounded at all.
+//!
+//! Names end in their unit where it is not plain. A bound that a user may move stands in [`crate::config`] with its default here.
+
+use std::time::Duration;
+
+// ---- Failure detection -------------------------------------------------------------------------------------------------
+
+/// How often a node sends a heartbeat.
+pub const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(50);
+
+/// Silence after which a node is suspected and its parts are given to others.
+pub const SUSPECT_AFTER: Duration = Duration::from_millis(500);
+
+/// Silence after which a suspected node is declared dead: its incarnation is void from then on.
+pub const DEAD_AFTER: Duration = Duration::from_secs(10);
+
+/// How long a job without any node waits for one before it fails.
+pub const NO_NODE_TIMEOUT: Duration = Duration::from_secs(60);
+
+// ---- Nodes -------------------------------------------------------------------------------------------------------------
+
+/// How far rendering threads stand back behind others, the network's thread first of all.
+pub const LANE_NICENESS: i32 = 5;
+
+/// Fetched assets that a node keeps, if it is not told otherwise.
+pub const CACHE_BYTES: u64 = 8 << 30;
+
+// ---- The wire ----------------------------------------------------------------------------------------------------------
+
+/// Silence after which QUIC gives a connection up: above [`DEAD_AFTER`], for the core is to decide who is dead.
+pub const IDLE_TIMEOUT: Duration = Duration::from_secs(15);
+
+/// Silence after which QUIC itself sends a packet.
+pub const KEEP_ALIVE: Duration = Duration::from_secs(1);
+
+/// Silence of the coordinator after which a node connects anew.
+pub const COORDINATOR_SILENCE: Duration = Duration::from_secs(3);
+
+/// How long a connection may take to stand.
+pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Pauses between a node's attempts to connect: from the first, doubling, to the last.
+pub const RECONNECT_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(5));
+
+/// How long the last words on a connection may take.
+pub const FAREWELL: Duration = Duration::from_millis(200);
+
+/// Streams that a peer may hold open at once, of either direction.
+pub const STREAMS_PER_PEER: u32 = 64;
+
+/// Bytes of one stream that may be under way.
+pub const STREAM_WINDOW_BYTES: u32 = 8 << 20;
+
+/// Bytes of all streams of one connection that may be under way.
+pub const RECEIVE_WINDOW_BYTES: u32 = 32 << 20;
+
+/// Bytes that a reader makes room for at once: more comes only as bytes do.
+pub const READ_CHUNK_BYTES: usize = 64 << 10;
+
+/// A [`crate::wire::NodeStream`] frame.
+pub const HELLO_BYTES: usize = 4 << 10;
+
+/// A frame of a control stream. Probe messages hold every cell of a frame.
+pub const CONTROL_BYTES: usize = 16 << 20;
+
+/// Pixels of one frame.
+pub const PIXELS_PER_FRAME: u64 = 1 << 30;
+
+/// A [`crate::wire::PartHeader`] frame.
+pub const PART_HEADER_BYTES: usize = 256;
+
+/// Pixels of one part.
+pub const PART_BYTES: usize = 1 << 30;
+
+/// A [`crate::wire::Request`] frame: a submission holds a whole description.
+pub const REQUEST_BYTES: usize = 256 << 20;
+
+/// A [`crate::wire::Response`] frame.
+pub const RESPONSE_BYTES: usize = 64 << 20;
+
+/// One asset.
+pub const ASSET_BYTES: usize = 4 << 30;
+
+/// One output file.
+pub const FILE_BYTES: u64 = 64 << 30;
+
+/// Events and parts that reach the disk with one wait for it.
+pub const JOURNAL_BATCH: usize = 1024;
+
+/// Pause before a write is tried again that the disk refused.
+pub const DISK_RETRY: Duration = Duration::from_secs(1);
+
+/// How often the farm's status is published to those who watch.
+pub const STATUS_INTERVAL: Duration = Duration::from_millis(100);
+
+/// A deadline missed by more than this means that the coordinator itself did not run.
+pub const LATE_TICK: Duration = Duration::from_millis(300);
+
+/// Events that wait for the farm's core; who adds one more waits.
+pub const EVENT_QUEUE: usize = 4096;
+
+/// Events that the core takes in one go, before it looks at the clock.
+pub const INPUT_BATCH: usize = 1024;
+
+/// Messages that wait for one peer; a peer that does not take them is disconnected.
+pub const PEER_QUEUE: usize = 65_536;
+
+/// A name in a certificate.
+pub const NAME_BYTES: usize = 64;
+
+/// A file with a key and certificates.
+pub const KEY_FILE_BYTES: u64 = 64 << 10;
+
+// ---- A job's beginning -------------------------------------------------------------------------------------------------
+
+/// How long a job waits for the nodes it asked for; then it begins with those that are there.
+pub const GATHER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How long a node may take to fetch and compile a scene before it is left out of the job.
+pub const PREPARE_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// How long nodes that are still preparing hold up those that are prepared. Late ones join while the job runs.
+pub const PREPARE_GRACE: Duration = Duration::from_secs(5);
+
+/// How long a probe without any answer may take; then every pixel counts as equally hard.
+pub const PROBE_TIMEOUT: Duration = Duration::from_secs(600);
+
+/// The least time that nodes which have not answered the probe hold up those that have. Late ones join while the job runs.
+pub const PROBE_GRACE: Duration = Duration::from_secs(2);
+
+// ---- The farm's memory -------------------------------------------------------------------------------------------------
+
+/// Nodes that the coordinator knows by name.
+pub const NODES: usize = 20_000;
+
+/// Jobs that wait or run.
+pub const JOBS_WAITING: usize = 1_000;
+
+/// Jobs that are over and still known.
+pub const JOBS_KEPT: usize = 100;
+
+/// Events in a journal beyond which it is begun anew once all its jobs are over: a bound of the time that a start takes.
+pub const JOURNAL_EVENTS: u64 = 100_000;
+
+/// Entries in the list of a job's events; later ones are counted, not listed.
+pub const EVENTS_PER_JOB: usize = 100_000;
+
+/// Attempts listed with one part; later ones are not listed.
+pub const ATTEMPTS_LISTED_PER_PART: usize = 64;
+
+// ---- Policies ----------------------------------------------------------------------------------------------------------
+
+/// How long a job's own policy may think when parts are redistributed; then the built-in decides.
+pub const REDISTRIBUTE_POLICY_TIMEOUT: Duration = Duration::from_millis(50);
+
+/// How long a job's own policy may think before rendering begins; then the job fails.
+pub const POLICY_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// How long the farm waits for that, the run of the script that may come before it included.
+pub const POLICY_PATIENCE: Duration = SCRIPT_TIME.saturating_add(POLICY_TIMEOUT);
+
+// ---- Parts -------------------------------------------------------------------------------------------------------------
+
+/// Parts of one job at the most.
+pub const PARTS_PER_JOB: usize = 200_000;
+
+/// Nodes that may fail at a part before the job fails.
+pub const FAILURES_PER_PART: usize = 3;
+
+/// Cells of a probe at the most; a finer probe gets larger cells.
+pub const PROBE_CELLS: u64 = 65_536;
+
+/// Cells that every node measures in a shared probe, along each axis.
+pub const PROBE_PATCH_PER_AXIS: u32 = 4;
+
+/// Parts a node holds beyond those its lanes render, so that no lane waits for the network.
+pub const PREFETCH_PER_LANE: usize = 1;
+
+/// How often a node that found nothing worth taking from another looks again.
+pub const STEAL_INTERVAL: Duration = Duration::from_millis(200);
+
+// ---- Job scripts -------------------------------------------------------------------------------------------------------
+
+/// Memory of a script's virtual machine.
+pub const SCRIPT_MEMORY_BYTES: usize = 1 << 30;
+
+/// Run time of a job script until its description stands.
+pub const SCRIPT_TIME: Duration = Duration::from_secs(30);
+
+/// Bytes of one script file.
+pub const SCRIPT_FILE_BYTES: u64 = 8 << 20;
+
+/// Lua modules of one job.
+pub const SCRIPT_MODULES: usize = 256;
+
+/// Objects (shapes, materials, lights ...) that one script makes.
+pub const SCRIPT_OBJECTS: usize = 2_000_000;
+
+/// Groups within groups.
+pub const SCRIPT_GROUP_DEPTH: u32 = 32;
+
+/// Bytes of all files and meshes of one job.
+pub const SCRIPT_ASSET_BYTES: u64 = 4 << 30;
+
+/// Bytes that a script may print.
+pub const SCRIPT_PRINT_BYTES: usize = 64 << 10;
+
+/// Files that one model refers to.
+pub const MODEL_PARTS: usize = 4096;
+
+/// Samples of a pixel.
+pub const SAMPLES_PER_PIXEL: u32 = 1 << 16;
+
+// ---- Reports -----------------------------------------------------------------------------------------------------------
+
+/// Bytes of a manifest that is read: room for [`PARTS_PER_JOB`] parts with several attempts each.
+pub const MANIFEST_BYTES: u64 = 1 << 28;
+
+// ---- Status page -------------------------------------------------------------------------------------------------------
+
+/// Parts of a job that are shown one by one.
+pub const STATUS_PARTS: usize = 20_000;

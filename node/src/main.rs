@@ -1,0 +1,5 @@
+//! The binary `tessera`.
+
+fn main() -> std::process::ExitCode {
+    tessera_node::cli::main()
+}

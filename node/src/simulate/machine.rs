@@ -1,0 +1,173 @@
+//! A simulated node: it answers what the farm asks, as a worker does, and takes its time for it.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::time::Duration;
+
+use tessera_engine::part::Rect;
+
+use super::random::Random;
+use super::{Machine, Scenario};
+use crate::farm::{Event, Incarnation, JobId, LeaseId, NodeInfo, ToNode};
+use crate::schedule::NodeId;
+
+/// A part that a machine holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Task {
+    pub job: JobId,
+    pub lease: LeaseId,
+    pub rect: Rect,
+}
+
+/// A machine while the simulation runs.
+#[derive(Clone, Debug)]
+pub(super) struct Node {
+    pub id: NodeId,
+    pub machine: Machine,
+    pub alive: bool,
+    pub life: u64,
+    pub slowness: f64,
+    pub fails_next: bool,
+    /// Until when the process stands still, and until when nothing passes.
+    pub paused: Duration,
+    pub parted: Duration,
+    /// Last moment at which a message of the farm arrives: they arrive in order.
+    pub link: Duration,
+    pub running: BTreeMap<LeaseId, Task>,
+    waiting: VecDeque<Task>,
+    delivered: BTreeMap<LeaseId, Event>,
+    prepared: BTreeSet<JobId>,
+}
+
+/// What a node does next: after some seconds it says something, or ends a part.
+pub(super) enum Act {
+    Say(f64, Event),
+    Finish(f64, Task),
+}
+
+impl Node {
+    pub fn new(index: usize, machine: Machine) -> Self {
+        Self {
+            id: NodeId(index as u32),
+            machine,
+            alive: false,
+            life: 0,
+            slowness: 1.0,
+            fails_next: false,
+            paused: Duration::ZERO,
+            parted: Duration::ZERO,
+            link: Duration::ZERO,
+            running: BTreeMap::new(),
+            waiting: VecDeque::new(),
+            delivered: BTreeMap::new(),
+            prepared: BTreeSet::new(),
+        }
+    }
+
+    pub fn incarnation(&self) -> Incarnation {
+        Incarnation(u64::from(self.id.0) << 32 | self.life)
+    }
+
+    /// A new process begins.
+    pub fn start(&mut self) {
+        self.end();
+        (self.alive, self.life) = (true, self.life + 1);
+        (self.paused, self.parted) = (Duration::ZERO, Duration::ZERO);
+    }
+
+    /// The process ends, and all that it had in memory.
+    pub fn end(&mut self) {
+        self.alive = false;
+        self.running.clear();
+        self.waiting.clear();
+        self.delivered.clear();
+        self.prepared.clear();
+    }
+
+    pub fn joined(&self) -> Event {
+        let name = format!("node-{}", self.id.0);
+        let info = NodeInfo { name, lanes: self.machine.lanes, build: "simulated".into(), address: "nowhere".into() };
+        Event::NodeJoined { node: self.id, incarnation: self.incarnation(), info }
+    }
+
+    /// Takes a message of the farm.
+    pub fn receive(&mut self, message: ToNode, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
+        let (node, incarnation) = (self.id, self.incarnation());
+        match message {
+            ToNode::Prove => vec![Act::Say(0.01, Event::NodeProved { node, incarnation, verdict: Ok(()) })],
+            ToNode::Prepare { job } => {
+                let result = if self.machine.incapable { Err("no room for the scene".into()) } else { Ok(()) };
+                self.prepared.insert(job);
+                vec![Act::Say(random.between(0.01, 0.3), Event::Prepared { node, incarnation, job, result })]
+            }
+            ToNode::Probe { job, cells, .. } => vec![self.probe(job, &cells, scenario, random)],
+            ToNode::Render { job, lease, rect, .. } => self.render(Task { job, lease, rect }, scenario, random),
+            ToNode::Cancel { lease, .. } => {
+                self.waiting.retain(|task| task.lease != lease);
+                self.running.remove(&lease);
+                self.begin(scenario, random)
+            }
+            ToNode::Release { job } => {
+                self.prepared.remove(&job);
+                self.waiting.retain(|task| task.job != job);
+                self.running.retain(|_, task| task.job != job);
+                Vec::new()
+            }
+        }
+    }
+
+    fn probe(&mut self, job: JobId, cells: &[(u32, Rect)], scenario: &Scenario, random: &mut Random) -> Act {
+        let mut total = 0.0;
+        let measured = cells.iter().map(|(cell, rect)| {
+            let (x, y) = (f64::from(rect.x) + f64::from(rect.width) / 2.0, f64::from(rect.y) + f64::from(rect.height) / 2.0);
+            let seconds = self.seconds(scenario.cost_at(x, y), random);
+            total += seconds * 16.0;
+            (*cell, seconds)
+        });
+        let cells = measured.collect();
+        let event = Event::Probed { node: self.id, incarnation: self.incarnation(), job, cells };
+        Act::Say(total / f64::from(self.machine.lanes), event)
+    }
+
+    /// Takes an order; one that it has already, or has carried out, is the same order again.
+    fn render(&mut self, task: Task, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
+        if let Some(event) = self.delivered.get(&task.lease) {
+            return vec![Act::Say(0.0, event.clone())];
+        }
+        if !self.running.contains_key(&task.lease) && !self.waiting.contains(&task) {
+            self.waiting.push_back(task);
+        }
+        self.begin(scenario, random)
+    }
+
+    /// Lets free lanes begin.
+    fn begin(&mut self, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
+        let mut acts = Vec::new();
+        while self.running.len() < self.machine.lanes as usize {
+            let Some(task) = self.waiting.pop_front() else { break };
+            self.running.insert(task.lease, task);
+            acts.push(Act::Finish(self.seconds(scenario.cost_of(task.rect), random), task));
+        }
+        acts
+    }
+
+    /// A lane is done with a part, unless it was called back.
+    pub fn finish(&mut self, task: Task, seconds: f64, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
+        let Some(task) = self.running.remove(&task.lease) else { return Vec::new() };
+        let (node, incarnation, Task { job, lease, rect }) = (self.id, self.incarnation(), task);
+        let event = if std::mem::take(&mut self.fails_next) {
+            Event::RenderFailed { node, incarnation, job, lease, reason: "the lane panicked".into() }
+        } else {
+            let hash = *blake3::hash(format!("{rect:?}").as_bytes()).as_bytes();
+            Event::Rendered { node, incarnation, job, lease, hash, seconds }
+        };
+        self.delivered.insert(lease, event.clone());
+        let mut acts = vec![Act::Say(0.0, event)];
+        acts.extend(self.begin(scenario, random));
+        acts
+    }
+
+    fn seconds(&self, cost: f64, random: &mut Random) -> f64 {
+        let jitter = 1.0 + self.machine.jitter * random.between(-1.0, 1.0);
+        cost / self.machine.speed * self.slowness * jitter
+    }
+}

@@ -1,0 +1,408 @@
+//! The world around the farm: time, the network, the disk, the job's own policy, and a judge who watches the promises.
+
+use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
+use std::{cmp::Reverse, time::Duration};
+
+use super::machine::{Act, Node, Task};
+use super::random::Random;
+use super::{Fault, Run, Scenario, ScriptPolicy};
+use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, LeaseId, NodeState, Outcome, Question, ToNode};
+use crate::journal::Filter;
+use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT};
+use crate::schedule::{NodeId, PartId, assign, split};
+
+const JOB: JobId = JobId(1);
+
+/// Parts beyond which the books are not checked after every step.
+const THICK: usize = 1_000;
+
+/// What happens at a moment.
+enum Happening {
+    /// The farm learns of something, unless the coordinator was started anew since (its epoch).
+    Farm(Event, u64),
+    /// The same, from a node in one of its lives.
+    FromNode(Event, usize, u64, u64),
+    /// A message arrives at a node.
+    ToNode(ToNode, usize, u64, u64),
+    /// A lane ends a part that took so many seconds.
+    Finish(usize, u64, Task, f64),
+    /// A node's heart beats.
+    Beat(usize, u64),
+    /// A node's connection is closed by the coordinator.
+    Closed(usize, u64),
+    /// Pixels of a part are on disk.
+    Stored(LeaseId, PartId, u64),
+    Fault(Fault),
+}
+
+/// A simulation while it runs.
+pub struct World {
+    scenario: Scenario,
+    random: Random,
+    farm: Farm,
+    nodes: Vec<Node>,
+    now: Duration,
+    agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
+    happenings: Vec<Option<Happening>>,
+    epoch: u64,
+    filter: Filter,
+    journal: Vec<(Duration, Event)>,
+    /// Parts on disk, with the attempt whose pixels they are.
+    disk: BTreeMap<PartId, LeaseId>,
+    /// Deliveries that the farm has to say something about.
+    open: BTreeSet<LeaseId>,
+    killed: BTreeMap<usize, Duration>,
+    trace: blake3::Hasher,
+    run: Run,
+}
+
+impl World {
+    /// A world in which nothing has happened yet.
+    pub fn new(scenario: Scenario) -> Self {
+        let mut farm = Farm::new(scenario.config.clone());
+        let submitted = Event::JobSubmitted { job: JOB, spec: scenario.job.clone() };
+        farm.step(Duration::ZERO, submitted.clone());
+        let nodes: Vec<Node> = scenario.machines.iter().enumerate().map(|(i, machine)| Node::new(i, machine.clone())).collect();
+        let powers = nodes.iter().map(|node| (node.id, node.machine.speed * f64::from(node.machine.lanes))).collect();
+        #[expect(clippy::expect_used, reason = "it was submitted above")]
+        let record = farm.record(JOB).expect("the job is known");
+        let mut world = Self {
+            random: Random::new(scenario.seed),
+            farm,
+            nodes,
+            now: Duration::ZERO,
+            agenda: BinaryHeap::new(),
+            happenings: Vec::new(),
+            epoch: 0,
+            filter: Filter::default(),
+            journal: vec![(Duration::ZERO, submitted)],
+            disk: BTreeMap::new(),
+            open: BTreeSet::new(),
+            killed: BTreeMap::new(),
+            trace: blake3::Hasher::new(),
+            run: Run {
+                outcome: None,
+                record,
+                violations: Vec::new(),
+                trace: [0; 32],
+                steps: 0,
+                detections: Vec::new(),
+                rendered: 0,
+                powers,
+            },
+            scenario,
+        };
+        let starts: Vec<(Duration, Fault)> =
+            world.nodes.iter().enumerate().map(|(i, node)| (node.machine.starts, Fault::Start(i))).collect();
+        let faults = world.scenario.faults.clone();
+        starts.into_iter().chain(faults).for_each(|(at, fault)| world.plan(at, Happening::Fault(fault)));
+        world
+    }
+
+    /// Lets everything happen until the job is over.
+    pub fn run(mut self) -> Run {
+        while self.run.outcome.is_none() && self.run.violations.is_empty() && self.now < self.scenario.horizon {
+            let next = self.agenda.peek().map(|Reverse((at, ..))| *at);
+            match (self.farm.next_deadline(), next) {
+                (Some(deadline), next) if next.is_none_or(|next| deadline < next) => {
+                    self.now = self.now.max(deadline);
+                    self.step(Event::Tick);
+                }
+                (_, Some(_)) => self.next(),
+                _ => break,
+            }
+        }
+        if self.run.outcome.is_none() && self.run.violations.is_empty() {
+            self.violation("the job does not end");
+        }
+        if let Some(record) = self.farm.record(JOB) {
+            self.run.record = record;
+        }
+        self.run.trace = *self.trace.finalize().as_bytes();
+        self.run
+    }
+
+    fn violation(&mut self, what: impl Into<String>) {
+        self.run.violations.push(format!("at {:.3} s: {}", self.now.as_secs_f64(), what.into()));
+    }
+
+    fn plan(&mut self, at: Duration, happening: Happening) {
+        self.agenda.push(Reverse((at, self.happenings.len() as u64, self.happenings.len())));
+        self.happenings.push(Some(happening));
+    }
+
+    fn next(&mut self) {
+        let Some(Reverse((at, _, index))) = self.agenda.pop() else { return };
+        self.now = self.now.max(at);
+        let Some(happening) = self.happenings[index].take() else { return };
+        if let Some(later) = self.held_up(&happening) {
+            return self.plan(later, happening);
+        }
+        match happening {
+            Happening::Farm(event, epoch) if epoch == self.epoch => self.step(event),
+            Happening::FromNode(event, _, _, epoch) if epoch == self.epoch => self.deliver(event),
+            Happening::ToNode(message, node, life, epoch) if self.lives(node, life) && epoch == self.epoch => {
+                let acts = self.nodes[node].receive(message, &self.scenario, &mut self.random);
+                self.act(node, acts);
+            }
+            Happening::Finish(node, life, task, seconds) if self.lives(node, life) => {
+                self.run.rendered += 1;
+                let acts = self.nodes[node].finish(task, seconds, &self.scenario, &mut self.random);
+                self.act(node, acts);
+            }
+            Happening::Beat(node, life) if self.lives(node, life) => self.beat(node),
+            Happening::Closed(node, life) if self.lives(node, life) => self.start(node),
+            Happening::Stored(lease, part, epoch) if epoch == self.epoch => {
+                self.store(lease, part);
+                self.step(Event::Committed { job: JOB, lease });
+            }
+            Happening::Fault(fault) => self.fault(fault),
+            _ => {}
+        }
+    }
+
+    fn lives(&self, node: usize, life: u64) -> bool {
+        self.nodes[node].alive && self.nodes[node].life == life
+    }
+
+    /// A process that stands still does nothing until it goes on; through a parted network streams deliver when it is whole again.
+    fn held_up(&self, happening: &Happening) -> Option<Duration> {
+        let (node, until) = match happening {
+            Happening::Finish(node, life, ..) | Happening::Beat(node, life) | Happening::Closed(node, life) => {
+                (self.lives(*node, *life), self.nodes[*node].paused)
+            }
+            Happening::ToNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].paused.max(self.nodes[*node].parted)),
+            Happening::FromNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].parted),
+            _ => return None,
+        };
+        (node && until > self.now).then_some(until)
+    }
+
+    fn delay(&mut self) -> Duration {
+        let (low, high) = self.scenario.network.delay;
+        self.random.seconds(low, high)
+    }
+
+    fn act(&mut self, node: usize, acts: Vec<Act>) {
+        for act in acts {
+            match act {
+                Act::Finish(seconds, task) => {
+                    let at = self.now + Duration::from_secs_f64(seconds);
+                    self.plan(at, Happening::Finish(node, self.nodes[node].life, task, seconds));
+                }
+                Act::Say(seconds, event) => self.say(node, seconds, event),
+            }
+        }
+    }
+
+    fn say(&mut self, node: usize, seconds: f64, event: Event) {
+        let at = self.now + Duration::from_secs_f64(seconds) + self.delay();
+        let (life, epoch) = (self.nodes[node].life, self.epoch);
+        if self.random.happens(self.scenario.network.duplication) {
+            let again = at + self.delay();
+            self.plan(again, Happening::FromNode(event.clone(), node, life, epoch));
+        }
+        self.plan(at, Happening::FromNode(event, node, life, epoch));
+    }
+
+    fn beat(&mut self, node: usize) {
+        let life = self.nodes[node].life;
+        self.plan(self.now + HEARTBEAT_INTERVAL, Happening::Beat(node, life));
+        if self.nodes[node].parted <= self.now && !self.random.happens(self.scenario.network.loss) {
+            let (at, incarnation) = (self.now + self.delay(), self.nodes[node].incarnation());
+            let heard = Event::NodeHeard { node: NodeId(node as u32), incarnation };
+            self.plan(at, Happening::Farm(heard, self.epoch));
+        }
+    }
+
+    /// What a node said arrives; of pixels the farm has to say at once what becomes of them.
+    fn deliver(&mut self, event: Event) {
+        if let Event::Rendered { lease, .. } = &event {
+            self.open.insert(*lease);
+        }
+        self.step(event);
+        if let Some(lease) = self.open.pop_first() {
+            self.violation(format!("pixels of lease {} are neither taken nor discarded", lease.0));
+        }
+    }
+
+    fn store(&mut self, lease: LeaseId, part: PartId) {
+        if let Some(first) = self.disk.insert(part, lease) {
+            self.violation(format!("part {} is committed twice, by leases {} and {}", part.0, first.0, lease.0));
+        }
+    }
+
+    fn step(&mut self, event: Event) {
+        let news = self.filter.admit(&self.farm, self.now, &event);
+        self.journal.extend(news);
+        let plain = matches!(&event, Event::NodeHeard { node, .. } if !self.farm.is_suspected(*node));
+        self.run.steps += 1;
+        let commands = self.farm.step(self.now, event.clone());
+        if !plain {
+            self.judge();
+            self.note_detections();
+            self.trace.update(format!("{:?}{event:?}{commands:?}", self.now).as_bytes());
+        }
+        commands.into_iter().for_each(|command| self.carry_out(command));
+    }
+
+    /// Checks the farm's books: after every step, or now and then where they are thick.
+    fn judge(&mut self) {
+        let parts = self.farm.jobs().first().map_or(0, |job| job.parts);
+        if !self.run.steps.is_multiple_of(1 + (parts / THICK) as u64) {
+            return;
+        }
+        if let Err(wrong) = self.farm.check_invariants() {
+            self.violation(wrong);
+        }
+    }
+
+    fn note_detections(&mut self) {
+        if self.killed.is_empty() {
+            return;
+        }
+        for node in self.farm.nodes() {
+            if matches!(node.state, NodeState::Suspected | NodeState::Lost)
+                && let Some(at) = self.killed.remove(&(node.id.0 as usize))
+            {
+                self.run.detections.push(self.now - at);
+            }
+        }
+    }
+
+    fn carry_out(&mut self, command: Command) {
+        match command {
+            Command::Send { node, incarnation, message } => self.send(node, incarnation, message),
+            Command::Close { node, incarnation, .. } => {
+                let index = node.0 as usize;
+                if self.nodes[index].incarnation() == incarnation {
+                    let at = self.now + self.delay();
+                    self.plan(at, Happening::Closed(index, self.nodes[index].life));
+                }
+            }
+            Command::AskPolicy { id, question, .. } => {
+                if let Some((seconds, answer)) = self.answer(&question) {
+                    let at = self.now + Duration::from_secs_f64(seconds);
+                    self.plan(at, Happening::Farm(Event::PolicyAnswered { id, answer }, self.epoch));
+                }
+            }
+            Command::Commit { part, lease, .. } => {
+                if !self.open.remove(&lease) {
+                    self.violation(format!("lease {} is to be committed, but its pixels are not here", lease.0));
+                }
+                let at = self.now + Duration::from_secs_f64(self.scenario.disk * self.random.between(0.5, 2.0));
+                self.plan(at, Happening::Stored(lease, part, self.epoch));
+            }
+            Command::Discard { lease, .. } => _ = self.open.remove(&lease),
+            Command::Assemble { .. } => self.assemble(),
+            Command::End { outcome, .. } => self.run.outcome = Some(outcome),
+        }
+    }
+
+    fn send(&mut self, node: NodeId, incarnation: Incarnation, message: ToNode) {
+        let index = node.0 as usize;
+        let at = (self.now + self.delay()).max(self.nodes[index].link);
+        if self.nodes[index].incarnation() == incarnation {
+            self.nodes[index].link = at;
+            self.plan(at, Happening::ToNode(message, index, self.nodes[index].life, self.epoch));
+        }
+    }
+
+    /// The job's own policy. Before rendering it answers well; later as the scenario says.
+    fn answer(&mut self, question: &Question) -> Option<(f64, Result<Answer, String>)> {
+        let plan = |parts, nodes| Answer::Plan(assign::paper(parts, nodes, &assign::Backlog::new()));
+        let (parts, nodes) = match question {
+            Question::Split { width, height, nodes, .. } => {
+                let rects = split::strips(*width, *height, 3 * nodes.len() as u32);
+                return Some((self.random.between(0.01, 2.0), Ok(Answer::Split(rects))));
+            }
+            Question::Assign { parts, nodes } => return Some((self.random.between(0.01, 2.0), Ok(plan(parts, nodes)))),
+            Question::Redistribute { parts, nodes } => (parts, nodes),
+        };
+        match self.scenario.policy {
+            ScriptPolicy::Good => Some((self.random.between(0.0, 0.049), Ok(plan(parts, nodes)))),
+            ScriptPolicy::Late => Some((self.random.between(0.051, 1.0), Ok(plan(parts, nodes)))),
+            ScriptPolicy::Never => None,
+            ScriptPolicy::Wrong => Some((0.001, Ok(plan(&parts[1..], nodes)))),
+            ScriptPolicy::Fails => Some((0.001, Err("job.lua:7: attempt to index nil".into()))),
+        }
+    }
+
+    /// Writes the outputs, if every pixel is on disk once.
+    fn assemble(&mut self) {
+        let committed = self.farm.committed(JOB);
+        let rects: Vec<_> = committed.iter().map(|(_, rect, _)| *rect).collect();
+        if let Err(wrong) = split::validate(&rects, self.scenario.job.width, self.scenario.job.height) {
+            self.violation(format!("the picture is not whole: {wrong}"));
+        }
+        if committed.iter().any(|(part, _, lease)| self.disk.get(part) != Some(lease)) {
+            self.violation("the farm takes parts for committed that are not on disk");
+        }
+        let at = self.now + Duration::from_millis(50);
+        self.plan(at, Happening::Farm(Event::Assembled { job: JOB, result: Ok(()) }, self.epoch));
+    }
+
+    fn start(&mut self, node: usize) {
+        self.nodes[node].start();
+        self.killed.remove(&node);
+        let life = self.nodes[node].life;
+        self.nodes[node].link = self.now;
+        let joined = self.nodes[node].joined();
+        self.say(node, 0.01, joined);
+        self.plan(self.now + HEARTBEAT_INTERVAL, Happening::Beat(node, life));
+    }
+
+    fn fault(&mut self, fault: Fault) {
+        match fault {
+            Fault::Start(node) => self.start(node),
+            Fault::Kill(node) => {
+                if self.nodes[node].alive && self.nodes[node].paused.max(self.nodes[node].parted) <= self.now {
+                    self.killed.insert(node, self.now);
+                }
+                self.nodes[node].end();
+            }
+            Fault::Leave(node) if self.nodes[node].alive => {
+                let (id, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
+                let left = Event::NodeLeft { node: id, incarnation, reason: "goodbye".into() };
+                let at = self.now + self.delay();
+                self.plan(at, Happening::Farm(left, self.epoch));
+                self.nodes[node].end();
+            }
+            Fault::Pause(node, length) => self.nodes[node].paused = self.now + length,
+            Fault::Partition(node, length) => self.nodes[node].parted = self.now + length.min(IDLE_TIMEOUT),
+            Fault::Slow(node, factor) => self.nodes[node].slowness = factor,
+            Fault::FailPart(node) => self.nodes[node].fails_next = true,
+            Fault::RestartCoordinator => self.restart(),
+            Fault::Cancel => self.step(Event::JobCancelled { job: JOB, reason: "not wanted".into() }),
+            Fault::Leave(_) => {}
+        }
+    }
+
+    /// The coordinator dies and comes back with what its journal tells, which must be what it knew.
+    fn restart(&mut self) {
+        self.journal.extend(self.filter.flush());
+        let mut again = Farm::new(self.scenario.config.clone());
+        for (at, event) in &self.journal {
+            again.step(*at, event.clone());
+        }
+        if let Some(difference) = self.farm.difference(&again) {
+            self.violation(format!("the replayed journal differs: {difference}"));
+        }
+        (self.farm, self.epoch) = (again, self.epoch + 1);
+        self.step(Event::Restarted);
+        for node in 0..self.nodes.len() {
+            if self.nodes[node].alive {
+                let joined = self.nodes[node].joined();
+                let seconds = self.random.between(0.05, 1.0);
+                self.say(node, seconds, joined);
+            }
+        }
+    }
+}
+
+impl Run {
+    /// Whether the job is finished.
+    pub fn finished(&self) -> bool {
+        self.outcome == Some(Outcome::Finished)
+    }
+}

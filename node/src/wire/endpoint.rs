@@ -1,0 +1,147 @@
+//! QUIC endpoints with mutual TLS.
+
+use std::{net::SocketAddr, sync::Arc, time::Duration};
+
+use quinn::{
+    ClientConfig, Connection, ConnectionId, ConnectionIdGenerator, Endpoint, EndpointConfig, IdleTimeout, ServerConfig, TransportConfig,
+    VarInt,
+    crypto::{
+        CryptoError, HmacKey,
+        rustls::{QuicClientConfig, QuicServerConfig},
+    },
+};
+use rustls::{RootCertStore, crypto::ring, server::WebPkiClientVerifier};
+
+use super::{
+    ALPN, COORDINATOR_NAME,
+    tls::{Identity, random},
+};
+use crate::{
+    error::{Error, ExitCode, Result},
+    limits::{IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
+};
+
+/// An endpoint that listens. Whoever has no certificate of the same farm is refused in the handshake.
+///
+/// # Errors
+/// When the address is taken or not ours.
+pub fn server(address: SocketAddr, identity: &Identity) -> Result<Endpoint> {
+    let verifier =
+        WebPkiClientVerifier::builder_with_provider(roots(identity)?, Arc::new(ring::default_provider())).build().map_err(tls)?;
+    let mut crypto = rustls::ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_protocol_versions(&[&rustls::version::TLS13])
+        .map_err(tls)?
+        .with_client_cert_verifier(verifier)
+        .with_single_cert(vec![identity.certificate.clone(), identity.authority.clone()], identity.key.clone_key())
+        .map_err(tls)?;
+    crypto.alpn_protocols = vec![ALPN.to_vec()];
+    let mut config = ServerConfig::with_crypto(Arc::new(QuicServerConfig::try_from(crypto).map_err(tls)?));
+    config.transport_config(transport());
+    let socket = std::net::UdpSocket::bind(address).map_err(|error| {
+        Error::new(ExitCode::Farm, format!("cannot listen on {address}: {error}"))
+            .with_help("another program has this port: end it, or choose another one with --listen")
+    })?;
+    endpoint(lasting(identity), Some(config), socket)
+}
+
+/// An endpoint that connects, with this identity.
+///
+/// # Errors
+/// When the machine gives no socket.
+pub fn client(identity: &Identity, to: SocketAddr) -> Result<Endpoint> {
+    let mut crypto = rustls::ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+        .with_protocol_versions(&[&rustls::version::TLS13])
+        .map_err(tls)?
+        .with_root_certificates(roots(identity)?)
+        .with_client_auth_cert(vec![identity.certificate.clone(), identity.authority.clone()], identity.key.clone_key())
+        .map_err(tls)?;
+    crypto.alpn_protocols = vec![ALPN.to_vec()];
+    let mut config = ClientConfig::new(Arc::new(QuicClientConfig::try_from(crypto).map_err(tls)?));
+    config.transport_config(transport());
+    let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+    let socket = std::net::UdpSocket::bind(any).map_err(|error| Error::new(ExitCode::Farm, format!("no UDP socket: {error}")))?;
+    let mut endpoint = endpoint(EndpointConfig::default(), None, socket)?;
+    endpoint.set_default_client_config(config);
+    Ok(endpoint)
+}
+
+/// Connects to a coordinator.
+///
+/// # Errors
+/// In words: when it cannot be reached, or either side refuses the other's certificate.
+pub async fn connect(endpoint: &Endpoint, to: SocketAddr) -> Result<Connection, String> {
+    let connecting = endpoint.connect(to, COORDINATOR_NAME).map_err(|error| error.to_string())?;
+    connecting.await.map_err(|error| error.to_string())
+}
+
+fn endpoint(config: EndpointConfig, server: Option<ServerConfig>, socket: std::net::UdpSocket) -> Result<Endpoint> {
+    let runtime = quinn::default_runtime().ok_or_else(|| Error::new(ExitCode::Internal, "no runtime for the network"))?;
+    Endpoint::new(config, server, socket, runtime).map_err(|error| Error::new(ExitCode::Farm, format!("cannot use the socket: {error}")))
+}
+
+/// Stateless resets are signed with a key that outlives the process, and answer packets for connections of an earlier process, so that peers of a
+/// restarted coordinator notice at once.
+fn lasting(identity: &Identity) -> EndpointConfig {
+    let mut config = EndpointConfig::new(Arc::new(ResetKey(blake3::derive_key("tessera stateless reset", identity.key.secret_der()))));
+    config.cid_generator(|| Box::new(PlainIds));
+    config
+}
+
+/// Random connection ids. Those that quinn makes by itself are signed with a key of the process; what another process made is dropped in silence.
+struct PlainIds;
+
+impl ConnectionIdGenerator for PlainIds {
+    fn generate_cid(&mut self) -> ConnectionId {
+        ConnectionId::new(&random().to_le_bytes())
+    }
+
+    fn cid_len(&self) -> usize {
+        8
+    }
+
+    fn cid_lifetime(&self) -> Option<Duration> {
+        None
+    }
+}
+
+struct ResetKey([u8; 32]);
+
+impl HmacKey for ResetKey {
+    fn sign(&self, data: &[u8], signature_out: &mut [u8]) {
+        blake3::Hasher::new_keyed(&self.0).update(data).finalize_xof().fill(signature_out);
+    }
+
+    fn signature_len(&self) -> usize {
+        32
+    }
+
+    fn verify(&self, data: &[u8], signature: &[u8]) -> Result<(), CryptoError> {
+        // Comparing `blake3::Hash`es takes the same time wherever they differ.
+        let expected = blake3::keyed_hash(&self.0, data);
+        let given: [u8; 32] = signature.try_into().map_err(|_| CryptoError)?;
+        if expected == blake3::Hash::from_bytes(given) { Ok(()) } else { Err(CryptoError) }
+    }
+}
+
+fn transport() -> Arc<TransportConfig> {
+    let mut config = TransportConfig::default();
+    config
+        .max_idle_timeout(IdleTimeout::try_from(IDLE_TIMEOUT).ok())
+        .keep_alive_interval(Some(KEEP_ALIVE))
+        .max_concurrent_bidi_streams(VarInt::from_u32(STREAMS_PER_PEER))
+        .max_concurrent_uni_streams(VarInt::from_u32(STREAMS_PER_PEER))
+        .stream_receive_window(VarInt::from_u32(STREAM_WINDOW_BYTES))
+        .receive_window(VarInt::from_u32(RECEIVE_WINDOW_BYTES))
+        .send_window(u64::from(RECEIVE_WINDOW_BYTES));
+    Arc::new(config)
+}
+
+fn roots(identity: &Identity) -> Result<Arc<RootCertStore>> {
+    let mut roots = RootCertStore::empty();
+    roots.add(identity.authority.clone()).map_err(tls)?;
+    Ok(Arc::new(roots))
+}
+
+fn tls(error: impl std::fmt::Display) -> Error {
+    Error::new(ExitCode::File, format!("these keys cannot be used: {error}"))
+}

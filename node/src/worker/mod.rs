@@ -1,0 +1,128 @@
+//! The worker: the shell around the engine. Joins a coordinator, renders parts on its lanes, hands them in.
+//!
+//! The network has a thread of its own with a runtime of its own; rendering happens on lanes of lower priority, so heartbeats go out
+//! whatever the load. What a lane has rendered is kept until the coordinator says that it is settled, over as many connections as it takes.
+
+mod cache;
+mod fetch;
+mod lanes;
+mod life;
+mod session;
+
+use std::{
+    net::{SocketAddr, ToSocketAddrs},
+    path::PathBuf,
+};
+
+use tokio::{
+    sync::{mpsc, watch},
+    time::{sleep, timeout},
+};
+
+use self::{
+    cache::Cache,
+    lanes::Lanes,
+    life::{Done, Life},
+    session::{Backoff, Ended, Node},
+};
+use crate::{
+    error::{Error, ExitCode, Result},
+    farm::Incarnation,
+    limits::CONNECT_TIMEOUT,
+    wire::{
+        self,
+        tls::{self, Identity},
+    },
+};
+
+/// How a node is set up.
+pub struct Options {
+    /// Host and port of the coordinator. The name is looked up at every attempt to connect, for addresses change.
+    pub coordinator: String,
+    /// Proves that it belongs to the farm.
+    pub identity: Identity,
+    /// Rendering threads, at least 1.
+    pub lanes: u32,
+    /// Folder of fetched assets; `None` keeps them in memory.
+    pub cache: Option<PathBuf>,
+    /// Bytes of fetched assets.
+    pub cache_bytes: u64,
+}
+
+/// Works until `stop` turns true; joins again for ever when the connection breaks.
+///
+/// # Errors
+/// When the machine gives no threads, no socket or no cache folder; never because of the network.
+pub fn run(options: &Options, stop: watch::Receiver<bool>) -> Result<()> {
+    let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
+    let cache = Cache::new(options.cache.as_deref(), options.cache_bytes)
+        .map_err(|error| Error::new(ExitCode::File, format!("the cache {:?}: {error}", options.cache)))?;
+    let node = Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, stop };
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
+    runtime.block_on(join_for_ever(options, &node))
+}
+
+async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
+    let mut stop = node.stop.clone();
+    let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
+    let mut backoff = Backoff::default();
+    loop {
+        match join_once(options, node, &mut life, &mut done, &mut backoff).await {
+            Ended::Stopped => return Ok(()),
+            Ended::Broken(reason) => tracing::warn!(reason, coordinator = options.coordinator, "not connected"),
+            Ended::Closed(reason) => {
+                tracing::warn!(reason, coordinator = options.coordinator, "the coordinator closed the connection");
+                (life, done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
+            }
+        }
+        tokio::select! {
+            _ = stop.wait_for(|&stop| stop) => return Ok(()),
+            () = sleep(backoff.pause()) => {}
+        }
+    }
+}
+
+async fn join_once(
+    options: &Options,
+    node: &Node,
+    life: &mut Life,
+    done: &mut mpsc::UnboundedReceiver<Done>,
+    backoff: &mut Backoff,
+) -> Ended {
+    let connect = async {
+        let address = resolve(&options.coordinator).await?;
+        let endpoint = wire::client(&options.identity, address).map_err(|error| error.to_string())?;
+        let connection = wire::connect(&endpoint, address).await?;
+        Ok::<_, String>((endpoint, connection))
+    };
+    let mut stop = node.stop.clone();
+    let connected = tokio::select! {
+        _ = stop.wait_for(|&stop| stop) => return Ended::Stopped,
+        connected = timeout(CONNECT_TIMEOUT, connect) => connected,
+    };
+    let (endpoint, connection) = match connected {
+        Ok(Ok(connected)) => connected,
+        Ok(Err(error)) => return Ended::Broken(error),
+        Err(_) => return Ended::Broken(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())),
+    };
+    tracing::info!(coordinator = options.coordinator, name = options.identity.peer.name, "connected");
+    let connected = std::time::Instant::now();
+    let ended = session::run(node, &connection, life, done).await;
+    if connected.elapsed() > CONNECT_TIMEOUT {
+        *backoff = Backoff::default();
+    }
+    // What was said last still has to leave.
+    let _ = timeout(crate::limits::FAREWELL, endpoint.wait_idle()).await;
+    ended
+}
+
+async fn resolve(host: &str) -> Result<SocketAddr, String> {
+    let owned = host.to_owned();
+    let found = tokio::task::spawn_blocking(move || owned.to_socket_addrs().map(|mut all| all.next())).await;
+    match found {
+        Ok(Ok(Some(address))) => Ok(address),
+        Ok(Ok(None)) => Err(format!("{host} has no address")),
+        Ok(Err(error)) => Err(format!("{host}: {error}")),
+        Err(error) => Err(error.to_string()),
+    }
+}

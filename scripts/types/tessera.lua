@@ -1,0 +1,494 @@
+---@meta tessera
+-- The API of Tessera's job scripts for lua-language-server. The reference, with units and defaults, is scripts/README.md.
+-- A line `-- @api NAME` begins what is said of one function; a test holds these blocks to the program.
+
+---@alias tessera.Vec3 number[]
+---@alias tessera.Color number|number[]
+---@alias tessera.Wrap "repeat"|"mirror"|"clamp"
+---@alias buffer userdata
+
+---@class tessera.Object
+---@class tessera.Group: tessera.Object
+---@class tessera.Material
+---@class tessera.Texture
+---@class tessera.Light
+---@class tessera.Camera
+---@class tessera.Integrator
+---@class tessera.Probe
+---@class tessera.Split
+---@class tessera.Assign
+---@class tessera.Scene
+---@class tessera.Job
+---@class tessera.Transform
+---@operator mul(tessera.Transform): tessera.Transform
+
+---@class tessera.Rect
+---@field x integer
+---@field y integer
+---@field width integer
+---@field height integer
+
+---@class tessera.Part: tessera.Rect
+---@field id integer
+---@field cost number
+
+---@class tessera.Node
+---@field id integer
+---@field name string
+---@field lanes integer
+---@field power number
+
+---@class tessera.Costs
+---@field cell integer
+---@field columns integer
+---@field rows integer
+---@field seconds_per_pixel number[]
+---@field seconds fun(rect: tessera.Rect): number
+
+---@alias tessera.SplitFunction fun(frame: {width: integer, height: integer}, costs: tessera.Costs, nodes: tessera.Node[]): tessera.Rect[]
+---@alias tessera.AssignFunction fun(parts: tessera.Part[], nodes: tessera.Node[]): table<integer, integer>
+
+---@class tessera.Random
+local random = {}
+
+local tessera = { probe = {}, split = {}, assign = {} }
+
+-- @api job: film
+---@class tessera.Film
+---@field width number columns
+---@field height number rows; the first is the top
+---@field filter? "box"|"point" what a pixel averages: its square evenly, or its middle alone
+
+-- @api job: quality
+---@class tessera.Quality
+---@field samples number samples in every pixel
+
+-- @api job: output
+---@class tessera.Output
+---@field exr? string the picture, scene-linear
+---@field png? string|false a preview; false: none
+---@field pixel_type? "float"|"half" 32 or 16 bits a number in the EXR
+---@field exposure? number brightness of the preview: radiance is multiplied by 2^exposure
+
+-- @api job
+---@class tessera.JobKeys
+---@field scene tessera.Scene what is there: tessera.scene
+---@field camera? tessera.Camera from where it is seen: tessera.perspective
+---@field film tessera.Film size of the frame: below
+---@field render? tessera.Integrator how light is followed
+---@field quality? tessera.Quality how accurately: below
+---@field probe? tessera.Probe how costs are learned
+---@field split? tessera.Split|tessera.SplitFunction how the frame becomes parts
+---@field assign? tessera.Assign|tessera.AssignFunction who renders which part
+---@field output? tessera.Output what is written: below
+---@field seed? number chooses the sample pattern
+
+---What the script returns.
+---@param keys tessera.JobKeys
+---@return tessera.Job
+function tessera.job(keys) end
+
+-- @api scene
+---@class tessera.SceneKeys
+---@field objects (tessera.Object|tessera.Object[])[] shapes, models, groups, instances; lists within lists are taken in place
+---@field lights? (tessera.Light|tessera.Light[])[] lights, in world coordinates
+---@field background? tessera.Color radiance of rays that leave the scene
+---@field name? string for messages
+
+---@param keys tessera.SceneKeys
+---@return tessera.Scene
+function tessera.scene(keys) end
+
+-- @api sphere
+---@class tessera.SphereKeys
+---@field center? tessera.Vec3 middle
+---@field radius? number radius
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---Its uv are longitude and latitude about y, each in [0, 1].
+---@param keys tessera.SphereKeys
+---@return tessera.Object
+function tessera.sphere(keys) end
+
+-- @api plane
+---@class tessera.PlaneKeys
+---@field point? tessera.Vec3 any point of it
+---@field normal? tessera.Vec3 perpendicular to it; any length
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---An infinite plane. Its uv are scene units along two axes of it: x and z for the normal {0, 1, 0}.
+---@param keys tessera.PlaneKeys
+---@return tessera.Object
+function tessera.plane(keys) end
+
+-- @api box
+---@class tessera.BoxKeys
+---@field min? tessera.Vec3 corner with the lowest coordinates
+---@field max? tessera.Vec3 corner with the highest; above min in each
+---@field center? tessera.Vec3 middle, with size
+---@field size? tessera.Vec3 lengths of the edges
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---Along the axes of its coordinates. Give min and max, or size and perhaps center.
+---@param keys tessera.BoxKeys
+---@return tessera.Object
+function tessera.box(keys) end
+
+-- @api disc
+---@class tessera.DiscKeys
+---@field center? tessera.Vec3 middle
+---@field normal? tessera.Vec3 perpendicular to it; any length
+---@field radius? number radius
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---A flat circle. Its uv run from 0 to 1 across the diameter.
+---@param keys tessera.DiscKeys
+---@return tessera.Object
+function tessera.disc(keys) end
+
+-- @api mesh
+---@class tessera.MeshKeys
+---@field positions tessera.Vec3[]|buffer vertices
+---@field triangles number[][]|buffer corners of each triangle
+---@field normals? tessera.Vec3[]|buffer one for each vertex; any length but 0
+---@field uvs? number[][]|buffer one for each vertex
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---Triangles, counter-clockwise seen from the front. From **tables**, vertices are counted from 1, as Lua does. From Luau **buffers** (32-bit floats, 32-bit unsigned integers, little-endian, without gaps), from 0, as files do; buffers make large meshes fast. A mesh that stands in several places belongs into a group with instances.
+---@param keys tessera.MeshKeys
+---@return tessera.Object
+function tessera.mesh(keys) end
+
+-- @api model
+---@class tessera.ModelKeys
+---@field file string the file
+---@field material? tessera.Material replaces every material of the file
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---A file made elsewhere, with its own hierarchy and materials: glTF 2.0 (.glb, .gltf), Wavefront OBJ with MTL (.obj), Stanford PLY (.ply). The files that it refers to are collected with it; they lie in its folder or below. What it asks for that is not modelled becomes a warning.
+---@param keys tessera.ModelKeys
+---@return tessera.Object
+function tessera.model(keys) end
+
+-- @api group
+---@class tessera.GroupKeys
+---@field [integer] tessera.Object|tessera.Object[]
+---@field name? string for messages
+
+---Objects in a list, placed together: tessera.group { a, b, c }. Put among objects, it stands at its own place; with tessera.instance it stands anywhere, any number of times, at the cost of one. Groups may hold groups, 32 deep.
+---@param keys? tessera.GroupKeys
+---@return tessera.Group
+function tessera.group(keys) end
+
+-- @api instance
+---@class tessera.InstanceKeys
+---@field group tessera.Group what is placed
+---@field transform? tessera.Transform where
+---@field name? string for messages
+
+---@param keys tessera.InstanceKeys
+---@return tessera.Object
+function tessera.instance(keys) end
+
+-- @api translate
+---@param x number|tessera.Vec3 along x
+---@param y number along y
+---@param z number along z
+---@return tessera.Transform
+function tessera.translate(x, y, z) end
+
+-- @api rotate
+---Counter-clockwise, seen with the axis pointing at you. Quarter turns are exact.
+---@param axis tessera.Vec3 what it turns about; any length
+---@param degrees number how far
+---@return tessera.Transform
+function tessera.rotate(axis, degrees) end
+
+-- @api scale
+---tessera.scale(2) scales alike in all directions. Negative factors mirror.
+---@param x number|tessera.Vec3 factor along x
+---@param y? number factor along y
+---@param z? number factor along z
+---@return tessera.Transform
+function tessera.scale(x, y, z) end
+
+-- @api look_at
+---Moves the origin to eye and turns -z towards target, as a camera of glTF stands.
+---@param eye tessera.Vec3 where the origin goes
+---@param target tessera.Vec3 where -z looks
+---@param up? tessera.Vec3 towards which y turns as far as it can
+---@return tessera.Transform
+function tessera.look_at(eye, target, up) end
+
+-- @api matrix
+---@param rows number[][] the map by rows; the last column moves. It must be invertible
+---@return tessera.Transform
+function tessera.matrix(rows) end
+
+-- @api diffuse
+---@class tessera.DiffuseKeys
+---@field reflectance? tessera.Color|tessera.Texture the share of light that is reflected
+---@field name? string for messages
+
+---Lambertian reflection, on both sides.
+---@param keys? tessera.DiffuseKeys
+---@return tessera.Material
+function tessera.diffuse(keys) end
+
+-- @api mirror
+---@class tessera.MirrorKeys
+---@field reflectance? tessera.Color the share of light that is reflected
+---@field name? string for messages
+
+---Perfect specular reflection, on both sides, alike at every angle.
+---@param keys? tessera.MirrorKeys
+---@return tessera.Material
+function tessera.mirror(keys) end
+
+-- @api glass
+---@class tessera.GlassKeys
+---@field ior? number index of refraction of the inside, relative to the outside
+---@field reflectance? tessera.Color multiplies what is reflected
+---@field transmittance? tessera.Color multiplies what is refracted, once at every surface
+---@field name? string for messages
+
+---A smooth dielectric: reflects and refracts by Fresnel's equations. Its shape should be closed; the normal points out of the glass.
+---@param keys? tessera.GlassKeys
+---@return tessera.Material
+function tessera.glass(keys) end
+
+-- @api checker
+---@class tessera.CheckerKeys
+---@field even? tessera.Color colour of the even squares
+---@field odd? tessera.Color colour of the odd squares
+---@field size? number edge of a square in units of uv
+---@field name? string for messages
+
+---Squares of two colours: even where floor(u / size) + floor(v / size) is even.
+---@param keys? tessera.CheckerKeys
+---@return tessera.Texture
+function tessera.checker(keys) end
+
+-- @api image
+---@class tessera.ImageKeys
+---@field file string the file
+---@field color_space? "srgb"|"linear" how its numbers are coded
+---@field wrap? tessera.Wrap|tessera.Wrap[] what lies beyond its edges in u and v
+---@field name? string for messages
+
+---A picture file: PNG, JPEG or Radiance HDR. Its first row lies at v = 0, as in glTF.
+---@param keys tessera.ImageKeys
+---@return tessera.Texture
+function tessera.image(keys) end
+
+-- @api rgb
+---@param r number red, linear
+---@param g number green, linear
+---@param b number blue, linear
+---@return number[]
+function tessera.rgb(r, g, b) end
+
+-- @api srgb
+---@param r number red as displays code it (IEC 61966-2-1)
+---@param g number green
+---@param b number blue
+---@return number[]
+function tessera.srgb(r, g, b) end
+
+-- @api hex
+---@param code string "#rrggbb" or "#rgb", sRGB, as on web pages; # may be left out
+---@return number[]
+function tessera.hex(code) end
+
+-- @api point
+---@class tessera.PointKeys
+---@field position tessera.Vec3 where it is, in the world
+---@field intensity tessera.Color power per steradian: a white diffuse surface that faces it at distance r shows radiance intensity / (pi r^2)
+---@field falloff? "inverse_square"|"none" "none": such a surface shows radiance intensity at any distance; for comparison with older ray tracers
+---@field name? string for messages
+
+---@param keys tessera.PointKeys
+---@return tessera.Light
+function tessera.point(keys) end
+
+-- @api directional
+---@class tessera.DirectionalKeys
+---@field direction tessera.Vec3 the direction in which the light travels; any length
+---@field irradiance tessera.Color on a surface that faces it; a white diffuse one shows radiance irradiance / pi
+---@field name? string for messages
+
+---@param keys tessera.DirectionalKeys
+---@return tessera.Light
+function tessera.directional(keys) end
+
+-- @api perspective
+---@class tessera.PerspectiveKeys
+---@field eye tessera.Vec3 where it stands
+---@field look_at? tessera.Vec3 what falls on the middle of the film; differs from eye
+---@field up? tessera.Vec3 what is upright on the film; not parallel to the view
+---@field fov? number full **horizontal** field of view
+---@field name? string for messages
+
+---An ideal pinhole with square pixels.
+---@param keys tessera.PerspectiveKeys
+---@return tessera.Camera
+function tessera.perspective(keys) end
+
+-- @api raycast
+---@class tessera.RaycastKeys
+
+---Nearest hit only: every light shines on it unhindered; mirror and glass show as diffuse of their reflectance.
+---@param keys? tessera.RaycastKeys
+---@return tessera.Integrator
+function tessera.raycast(keys) end
+
+-- @api whitted
+---@class tessera.WhittedKeys
+---@field max_depth? number longest chain of rays, the camera's included
+---@field transparent_shadows? boolean whether glass lets shadow rays pass, weakened by its transmittance at every surface; not physical
+---@field min_weight? number rays whose weight in the pixel is this or less are not traced; 0 traces all
+
+---Nearest hit, a shadow ray to every light, reflected and refracted rays.
+---@param keys? tessera.WhittedKeys
+---@return tessera.Integrator
+function tessera.whitted(keys) end
+
+-- @api probe.every_node
+---@class tessera.ProbeEveryNodeKeys
+---@field scale? number fraction of the resolution along each edge
+
+---Every node renders the whole frame at low resolution.
+---@param keys? tessera.ProbeEveryNodeKeys
+---@return tessera.Probe
+function tessera.probe.every_node(keys) end
+
+-- @api probe.shared
+---@class tessera.ProbeSharedKeys
+---@field scale? number fraction of the resolution along each edge
+
+---The nodes share the frame out at low resolution; a small patch, rendered by all, makes their times comparable.
+---@param keys? tessera.ProbeSharedKeys
+---@return tessera.Probe
+function tessera.probe.shared(keys) end
+
+-- @api probe.from
+---No probe: costs and powers as an earlier job's manifest tells. Its film must have the same size; nodes that it does not name count as its mean.
+---@param manifest string the manifest's file
+---@return tessera.Probe
+function tessera.probe.from(manifest) end
+
+-- @api split.grid
+---@class tessera.SplitGridKeys
+---@field size? number edge of square parts in pixels
+---@field width? number columns of a part
+---@field height? number rows of a part
+
+---Rectangles, smaller at the right and lower border. Give size, or width and height.
+---@param keys? tessera.SplitGridKeys
+---@return tessera.Split
+function tessera.split.grid(keys) end
+
+-- @api split.strips
+---@class tessera.SplitStripsKeys
+---@field count number horizontal strips of the full width
+
+---@param keys tessera.SplitStripsKeys
+---@return tessera.Split
+function tessera.split.strips(keys) end
+
+-- @api assign.naive
+---Contiguous segments of parts, sized by the nodes' powers alone.
+---@type tessera.Assign
+tessera.assign.naive = nil
+
+-- @api assign.paper
+---The hardest part to the most powerful node, statically, before rendering begins.
+---@type tessera.Assign
+tessera.assign.paper = nil
+
+-- @api assign.earliest_finish
+---Every part, hardest first, to the node that would finish it first; a node that runs out takes from the fullest queue.
+---@type tessera.Assign
+tessera.assign.earliest_finish = nil
+
+-- @api random
+---A generator that gives the same numbers on every machine.
+---@param seed? number which numbers
+---@return tessera.Random
+function tessera.random(seed) end
+
+-- @api random:uniform
+---@param lowest? number may come out
+---@param highest? number may not
+---@return number
+function random:uniform(lowest, highest) end
+
+-- @api random:integer
+---@param lowest number may come out
+---@param highest number may come out too
+---@return number
+function random:integer(lowest, highest) end
+
+-- @api random:normal
+---@param mean? number middle
+---@param deviation? number standard deviation
+---@return number
+function random:normal(mean, deviation) end
+
+-- @api random:in_sphere
+---A point inside a sphere about the origin, evenly.
+---@param radius? number radius
+---@return number[]
+function random:in_sphere(radius) end
+
+-- @api random:on_sphere
+---A point on a sphere about the origin, evenly.
+---@param radius? number radius
+---@return number[]
+function random:on_sphere(radius) end
+
+-- @api random:in_disc
+---A point {x, 0, z} inside a circle about the origin, evenly.
+---@param radius? number radius
+---@return number[]
+function random:in_disc(radius) end
+
+-- @api random:choice
+---@generic T
+---@param list T[] one of its values comes out
+---@return T
+function random:choice(list) end
+
+-- @api random:shuffle
+---@generic T
+---@param list T[] a copy in another order comes out
+---@return T[]
+function random:shuffle(list) end
+
+-- @api param
+---The value of --set name=value, in the type of the default; without a default, a text that must be given. A --set that no script asks for is an error.
+---@generic T
+---@param name string the parameter
+---@param default? T what it is when it is not given
+---@return T
+function tessera.param(name, default) end
+
+-- @api param_file
+---A file. Given with --set it is relative to the working directory and may lie anywhere; the default is relative to the Lua file.
+---@param name string the parameter
+---@param default? string the file when none is given
+---@return string
+function tessera.param_file(name, default) end
+
+return tessera

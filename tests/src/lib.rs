@@ -1,0 +1,6 @@
+//! What the tests share.
+//!
+//! Tests of one room stand in that room; here stand those that need the whole.
+
+pub mod farm;
+pub mod s1;

@@ -1,0 +1,238 @@
+//! The farm's core under seeded schedules of faults, on virtual time.
+//!
+//! A failing schedule is printed with the command that replays it. `TESSERA_SCHEDULES` sets how many are tried, `TESSERA_SEED` tries one alone.
+
+use std::time::Duration;
+
+use tessera_node::farm::Outcome;
+use tessera_node::manifest::{AttemptOutcome, EventKind};
+use tessera_node::schedule::{Assign, Probe, Split};
+use tessera_node::simulate::{Fault, Run, Scenario, World};
+
+const SCHEDULES: u64 = 1_000;
+
+fn number(name: &str) -> Option<u64> {
+    std::env::var(name).ok().map(|value| value.parse().unwrap_or_else(|_| panic!("{name} is not a number: {value}")))
+}
+
+fn run(scenario: Scenario) -> Run {
+    let seed = scenario.seed;
+    let run = World::new(scenario).run();
+    assert!(run.violations.is_empty(), "{}\nreplay it: tessera simulate --schedule {seed}", run.violations.join("\n"));
+    run
+}
+
+fn grid(size: u32) -> Split {
+    Split::Grid { width: size, height: size }
+}
+
+/// 15 nodes of the powers 0.5 to 2.
+fn farm_of_15() -> Vec<(u32, f64)> {
+    (0..15).map(|i| (1 + i % 2, 0.5 + f64::from(i * 7 % 15) / 14.0 * 0.75)).collect()
+}
+
+#[test]
+fn no_schedule_loses_a_part_or_commits_one_twice() {
+    let seeds = number("TESSERA_SEED").map_or(0..number("TESSERA_SCHEDULES").unwrap_or(SCHEDULES), |seed| seed..seed + 1);
+    let many = seeds.end - seeds.start >= SCHEDULES;
+    let (mut finished, mut lost, mut suspected, mut recovered, mut discarded, mut replaced) = (0, 0, 0, 0, 0, 0);
+    for seed in seeds {
+        let scenario = Scenario::chaos(seed);
+        let run = run(scenario.clone());
+        let cancelled = scenario.faults.iter().any(|(_, fault)| *fault == Fault::Cancel);
+        let failing = scenario.faults.iter().filter(|(_, fault)| matches!(fault, Fault::FailPart(_))).count() > 2;
+        match run.outcome {
+            Some(Outcome::Finished) => finished += 1,
+            Some(Outcome::Cancelled { .. }) if cancelled => {}
+            Some(Outcome::Failed { .. }) if failing => {}
+            outcome => panic!("{outcome:?}\nreplay it: tessera simulate --schedule {seed}"),
+        }
+        lost += run.count(EventKind::Lost);
+        suspected += run.count(EventKind::Suspected);
+        recovered += run.count(EventKind::Recovered);
+        replaced += run.count(EventKind::PolicyReplaced);
+        discarded += run.attempts(AttemptOutcome::Lost) + run.attempts(AttemptOutcome::Cancelled);
+    }
+    println!(
+        "{finished} finished, {lost} nodes lost, {suspected} suspected, {recovered} heard again, {discarded} attempts lost or called back, {replaced} policies replaced"
+    );
+    if many {
+        // The schedules are worth their time only if what they are for happens in them.
+        assert!(finished > 900 && lost > 300 && suspected > 300 && recovered > 100 && discarded > 1_000 && replaced > 50);
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_run() {
+    for seed in 0..20 {
+        let (first, second) = (run(Scenario::chaos(seed)), run(Scenario::chaos(seed)));
+        assert_eq!((first.trace, first.steps, first.record), (second.trace, second.steps, second.record), "seed {seed}");
+    }
+    assert_ne!(run(Scenario::chaos(1)).trace, run(Scenario::chaos(2)).trace);
+}
+
+#[test]
+fn a_silent_death_is_noticed_within_a_second() {
+    let mut detections: Vec<Duration> = (0..200)
+        .flat_map(|seed| {
+            let mut scenario = Scenario::plain(seed, &[(1, 1.0), (1, 1.0), (1, 1.0), (1, 1.0)], grid(96), Assign::EarliestFinish);
+            scenario.work = 40.0;
+            scenario.network.delay = (0.001, 0.2);
+            scenario.network.loss = 0.05;
+            let moment = |share: u64| Duration::from_millis(1_500 + share * 997 % 6_000);
+            scenario.faults = vec![(moment(seed), Fault::Kill(1)), (moment(seed * 3 + 1), Fault::Kill(2))];
+            let run = run(scenario);
+            assert_eq!((run.finished(), run.detections.len()), (true, 2), "seed {seed}");
+            run.detections
+        })
+        .collect();
+    detections.sort();
+    let p99 = detections[detections.len() * 99 / 100];
+    println!("p50 {:?}, p99 {p99:?}, longest {:?}", detections[detections.len() / 2], detections.last());
+    assert!(p99 <= Duration::from_secs(1));
+}
+
+#[test]
+fn nobody_is_suspected_without_a_fault() {
+    // Five nodes, a network with 200 ms of jitter and 5 % loss: 500 jobs of some 20 s.
+    for seed in 0..500 {
+        let mut scenario = Scenario::plain(seed, &[(2, 1.0), (1, 2.0), (1, 0.5), (4, 1.0), (1, 1.0)], grid(128), Assign::EarliestFinish);
+        scenario.work = 150.0;
+        scenario.network.delay = (0.001, 0.2);
+        scenario.network.loss = 0.05;
+        let run = run(scenario);
+        assert!(run.finished());
+        assert_eq!(run.count(EventKind::Suspected) + run.count(EventKind::Lost), 0, "seed {seed}");
+    }
+}
+
+#[test]
+fn fourteen_of_fifteen_die_and_the_job_completes() {
+    for assign in [Assign::EarliestFinish, Assign::Paper, Assign::Naive, Assign::Script] {
+        let mut scenario = Scenario::plain(3, &farm_of_15(), grid(64), assign);
+        scenario.faults = (1..15).map(|node| (Duration::from_millis(3_000 + 700 * node as u64), Fault::Kill(node))).collect();
+        let run = run(scenario);
+        assert!(run.finished(), "{assign:?}");
+        assert_eq!(run.count(EventKind::Suspected), 14);
+    }
+}
+
+#[test]
+fn all_die_and_one_comes_back_in_time_or_too_late() {
+    let mut scenario = Scenario::plain(4, &[(1, 1.0), (2, 1.0)], grid(96), Assign::Paper);
+    let kills = |at: u64| [(Duration::from_secs(at), Fault::Kill(0)), (Duration::from_secs(at), Fault::Kill(1))];
+    scenario.faults = kills(40).into_iter().chain([(Duration::from_secs(90), Fault::Start(1))]).collect();
+    let back = run(scenario.clone());
+    assert!(back.finished());
+    let before = back.record.parts.iter().filter(|part| part.attempts.last().is_some_and(|attempt| attempt.end < Some(40.5))).count();
+    let again = back
+        .record
+        .parts
+        .iter()
+        .filter(|part| part.attempts.iter().filter(|a| a.outcome == AttemptOutcome::Committed).count() != 1)
+        .count();
+    assert!(before > 3 && again == 0, "{before} parts were done before; none is done again");
+    scenario.faults = kills(40).to_vec();
+    let gone = run(scenario);
+    let Some(Outcome::Failed { reason }) = gone.outcome else { panic!("{:?}", gone.outcome) };
+    assert!(reason.starts_with("all nodes died, and none came within 60 s"), "{reason}");
+    assert!((100.0..103.0).contains(&gone.record.seconds), "{}", gone.record.seconds);
+}
+
+#[test]
+fn a_paused_node_comes_back_and_nothing_is_committed_twice() {
+    // 3 s: suspected, heard again. 14 s: declared dead, a zombie.
+    for (pause, lost) in [(3, 0), (14, 1)] {
+        let mut scenario = Scenario::plain(5, &[(2, 1.0), (2, 1.0), (2, 1.0)], grid(96), Assign::EarliestFinish);
+        scenario.work = 200.0;
+        scenario.faults = vec![(Duration::from_secs(8), Fault::Pause(1, Duration::from_secs(pause)))];
+        let run = run(scenario);
+        assert!(run.finished());
+        assert_eq!((run.count(EventKind::Suspected), run.count(EventKind::Lost)), (1, lost));
+        let late = run.record.parts.iter().flat_map(|part| &part.attempts).filter(|a| a.node.0 == 1 && a.start > 8.0 + pause as f64);
+        assert!(late.count() > 0, "after its pause it gets work again");
+    }
+}
+
+#[test]
+fn a_node_that_joins_late_gets_work() {
+    let mut scenario = Scenario::plain(6, &[(1, 1.0), (4, 1.0)], grid(64), Assign::EarliestFinish);
+    (scenario.job.min_nodes, scenario.work) = (1, 120.0);
+    scenario.machines[1].starts = Duration::from_secs(20);
+    let run = run(scenario);
+    let begins = run.record.parts.iter().flat_map(|part| &part.attempts).filter(|a| a.node.0 == 1).map(|a| a.start);
+    let first = begins.fold(f64::INFINITY, f64::min);
+    assert!((20.0..22.0).contains(&first), "first part at {first} s");
+    assert!(run.makespan() < 50.0, "{} s", run.makespan());
+}
+
+#[test]
+fn a_part_that_fails_everywhere_fails_the_job_by_name() {
+    let mut scenario = Scenario::plain(7, &[(1, 1.0), (1, 1.0), (1, 1.0)], Split::Strips { count: 1 }, Assign::Paper);
+    scenario.faults = (0..3).map(|node| (Duration::from_secs(1), Fault::FailPart(node))).collect();
+    scenario.work = 5.0;
+    let run = run(scenario);
+    let Some(Outcome::Failed { reason }) = &run.outcome else { panic!("{:?}", run.outcome) };
+    assert!(reason.starts_with("part 0 (x = 0, y = 0, width = 1024, height = 768) failed 3 times: node-"), "{reason}");
+    assert_eq!(run.record.parts[0].attempts.iter().map(|a| a.node.0).collect::<std::collections::BTreeSet<_>>().len(), 3);
+}
+
+#[test]
+fn a_node_that_cannot_compile_the_scene_is_left_out_with_its_reason() {
+    let mut scenario = Scenario::plain(8, &[(1, 1.0), (1, 1.0)], grid(128), Assign::EarliestFinish);
+    scenario.work = 10.0;
+    scenario.machines[1].incapable = true;
+    let one = run(scenario.clone());
+    assert!(one.finished());
+    assert_eq!(one.record.warnings, ["node node-1 takes no part in the job: no room for the scene"]);
+    scenario.machines[0].incapable = true;
+    let none = run(scenario).outcome;
+    let reason = "no node can render it: node-0: no room for the scene; node-1: no room for the scene";
+    assert_eq!(none, Some(Outcome::Failed { reason: reason.into() }));
+}
+
+#[test]
+fn a_bad_policy_is_replaced_while_rendering_and_said_so() {
+    use tessera_node::simulate::ScriptPolicy::{Fails, Good, Late, Never, Wrong};
+    for policy in [Good, Late, Never, Wrong, Fails] {
+        let mut scenario = Scenario::plain(9, &[(1, 1.0), (1, 1.0), (1, 1.0)], grid(96), Assign::Script);
+        (scenario.policy, scenario.work) = (policy, 60.0);
+        scenario.faults = vec![(Duration::from_secs(6), Fault::Kill(1))];
+        let run = run(scenario);
+        assert!(run.finished());
+        assert_eq!(run.count(EventKind::PolicyReplaced), usize::from(policy != Good), "{policy:?}");
+        assert_eq!(run.record.warnings.len(), usize::from(policy != Good));
+    }
+}
+
+#[test]
+fn probes_find_the_powers() {
+    for probe in [Probe::EveryNode { scale: 1.0 / 16.0 }, Probe::Shared { scale: 1.0 / 16.0 }] {
+        let mut scenario = Scenario::plain(10, &farm_of_15(), grid(64), Assign::EarliestFinish);
+        scenario.job.probe = probe;
+        let run = run(scenario);
+        let ratio = |node: &tessera_node::manifest::NodeEntry| node.power / run.powers[&node.id];
+        let mut ratios: Vec<f64> = run.record.nodes.iter().map(ratio).collect();
+        ratios.sort_by(f64::total_cmp);
+        assert!(ratios[14] / ratios[0] < 1.1, "{ratios:?}"); // times jitter by 2 %
+        assert_eq!((run.record.power.len(), run.record.difficulty.len()), (15, run.record.parts.len()));
+    }
+}
+
+#[test]
+fn good_policies_are_better_than_bad_ones() {
+    let figures = |split: Split, assign| {
+        let scenario = Scenario::plain(11, &farm_of_15(), split, assign);
+        let work = scenario.work_of_frame();
+        run(scenario).figures(work)
+    };
+    let (_, naive, _) = figures(Split::Strips { count: 15 }, Assign::Naive);
+    let (_, ranked, _) = figures(Split::Strips { count: 15 }, Assign::Paper);
+    let (_, paper, _) = figures(grid(32), Assign::Paper);
+    let (_, stealing, overbalance) = figures(grid(32), Assign::EarliestFinish);
+    println!(
+        "efficiency: naive {naive:.3}, ranked {ranked:.3}, paper {paper:.3}, earliest_finish {stealing:.3} (overbalance {overbalance:.3})"
+    );
+    assert!(naive < ranked && ranked < paper && paper < stealing);
+    assert!(stealing > 0.96 && paper > 0.9);
+}
