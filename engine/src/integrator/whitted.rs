@@ -49,14 +49,18 @@ impl Integrator for Whitted {
         let mut branch = Branch { ray: *ray, weight: DVec3::ONE, depth: 1 };
         loop {
             let met = if branch.depth == 1 { scene.closest_from_eye(&branch.ray) } else { scene.closest(&branch.ray) };
-            let (shown, child) = match &met {
-                None => (rgb(scene.background), None),
-                Some(surface) => self.meet(scene, &branch, surface),
+            let goes_on = match &met {
+                None => {
+                    radiance += branch.weight * rgb(scene.background);
+                    false
+                }
+                Some(surface) => self.meet(scene, surface, &mut branch, &mut radiance),
             };
-            radiance += branch.weight * shown;
-            match child.or_else(|| self.waiting.pop()) {
-                Some(next) => branch = next,
-                None => return radiance,
+            if !goes_on {
+                match self.waiting.pop() {
+                    Some(next) => branch = next,
+                    None => return radiance,
+                }
             }
         }
     }
@@ -67,38 +71,49 @@ impl Integrator for Whitted {
 }
 
 impl Whitted {
-    /// What the end of a branch shows by itself, and the child to follow next; another is left waiting.
+    /// Adds what the end of a branch shows by itself to the radiance, and turns the branch, where it stands, into the one to follow next, if there is
+    /// one; another is left waiting.
     #[inline(always)]
-    fn meet(&mut self, scene: impl Tracer, branch: &Branch, surface: &Surface) -> (DVec3, Option<Branch>) {
+    fn meet(&mut self, scene: impl Tracer, surface: &Surface, branch: &mut Branch, radiance: &mut DVec3) -> bool {
         let material = &scene.materials[surface.material as usize];
         let direction = branch.ray.direction;
         match material.bsdf {
             Bsdf::Diffuse { reflectance, .. } => {
                 let albedo = direct::albedo(scene, material, surface, reflectance);
-                (direct::reflected(scene, surface, direction, albedo, |light, ray| self.visible(scene, light, ray)), None)
+                *radiance +=
+                    branch.weight * direct::reflected(scene, surface, direction, albedo, |light, ray| self.visible(scene, light, ray));
+                false
             }
-            Bsdf::Mirror { reflectance } => (DVec3::ZERO, self.child(branch, surface, mirrored(direction, surface), reflectance)),
+            Bsdf::Mirror { reflectance } => self.follow(branch, surface, mirrored(direction, surface), reflectance),
             Bsdf::Glass { ior, reflectance, transmittance } => {
                 let at = interface(direction, shading_normal(direction, surface), ior);
-                let reflected = self.child(branch, surface, mirrored(direction, surface), reflectance * at.reflected);
-                let refracted =
-                    at.refracted.and_then(|refracted| self.child(branch, surface, refracted, transmittance * (1.0 - at.reflected)));
-                if refracted.is_none() {
-                    return (DVec3::ZERO, reflected);
+                let Some(refracted) = at.refracted else {
+                    return self.follow(branch, surface, mirrored(direction, surface), reflectance);
+                };
+                let mut reflected = *branch;
+                let reflects = self.follow(&mut reflected, surface, mirrored(direction, surface), reflectance * at.reflected);
+                if !self.follow(branch, surface, refracted, transmittance * (1.0 - at.reflected)) {
+                    *branch = reflected;
+                    return reflects;
                 }
-                self.waiting.extend(reflected);
-                (DVec3::ZERO, refracted)
+                if reflects {
+                    self.waiting.push(reflected);
+                }
+                true
             }
         }
     }
 
-    /// A ray that follows from a branch, unless the chain of rays is too long or its weight too small: the largest component counts.
+    /// Turns a branch into the ray that follows from it, unless the chain of rays is too long or its weight too small: the largest component counts.
     #[inline(always)]
-    fn child(&mut self, parent: &Branch, surface: &Surface, direction: DVec3, share: DVec3) -> Option<Branch> {
-        let weight = parent.weight * share;
-        let follow = parent.depth < self.max_depth && weight.max_element() > self.min_weight;
-        self.counts.secondary += u64::from(follow);
-        follow.then(|| Branch { ray: surface.spawn(direction), weight, depth: parent.depth + 1 })
+    fn follow(&mut self, branch: &mut Branch, surface: &Surface, direction: DVec3, share: DVec3) -> bool {
+        let weight = branch.weight * share;
+        let follow = branch.depth < self.max_depth && weight.max_element() > self.min_weight;
+        if follow {
+            self.counts.secondary += 1;
+            *branch = Branch { ray: surface.spawn(direction), weight, depth: branch.depth + 1 };
+        }
+        follow
     }
 
     /// The share of a light that arrives at the start of a ray towards it.

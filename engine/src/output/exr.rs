@@ -61,13 +61,10 @@ const HALF_MAX: f32 = 65_504.0;
 /// # Errors
 /// If the file cannot be written; an older one then stays as it was.
 pub fn write(path: &Path, film: &Film, pixel_type: PixelType, identity: &Identity) -> Result<u64, OutputError> {
-    let clamped = match pixel_type {
-        PixelType::Float => 0,
-        PixelType::Half => film.pixels().iter().flatten().filter(|&&number| number > HALF_MAX).count() as u64,
-    };
     let header = header(film, pixel_type, identity);
+    let mut clamped = 0;
     write_atomically(path, |file| {
-        let chunks = |_, writer: &mut _| write_chunks(writer, film, pixel_type);
+        let chunks = |_, writer: &mut _| write_chunks(writer, film, pixel_type).map(|count| clamped = count);
         block::write(file, [header?].into_iter().collect(), true, chunks).map_err(io_error)
     })?;
     Ok(clamped)
@@ -97,9 +94,11 @@ fn header(film: &Film, pixel_type: PixelType, identity: &Identity) -> io::Result
     Ok(header)
 }
 
-/// The crate would compress chunks by itself, but four times slower than [`Compressor`] for files that are not much smaller.
-fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelType) -> Result<(), Error> {
+/// Returns how many numbers were clamped. The crate would compress chunks by itself, but four times slower than [`Compressor`] for files that are not
+/// much smaller.
+fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelType) -> Result<u64, Error> {
     let (mut compressor, mut numbers, mut halves, mut bytes) = (Compressor::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut clamped = 0;
     let chunks = film.pixels().chunks(ROWS * film.width() as usize);
     for (index, (y_coordinate, rows)) in (0_i32..).step_by(ROWS).zip(chunks).enumerate() {
         bytes.clear();
@@ -108,10 +107,10 @@ fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelTy
                 numbers.clear();
                 numbers.extend(row.iter().map(|pixel| pixel[component]));
                 match pixel_type {
-                    PixelType::Float => bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes())),
+                    PixelType::Float => append(&mut bytes, &numbers, f32::to_le_bytes),
                     PixelType::Half => {
-                        round_to_halves(&mut numbers, &mut halves);
-                        bytes.extend(halves.iter().flat_map(|half| half.to_le_bytes()));
+                        clamped += round_to_halves(&mut numbers, &mut halves);
+                        append(&mut bytes, &halves, f16::to_le_bytes);
                     }
                 }
             }
@@ -119,14 +118,24 @@ fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelTy
         let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le: compressor.compress(&bytes) };
         writer.write_chunk(index, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })?;
     }
-    Ok(())
+    Ok(clamped)
 }
 
-/// The nearest halves, ties to even; numbers beyond the largest half become it.
-fn round_to_halves(numbers: &mut [f32], halves: &mut Vec<f16>) {
+/// Appends the bytes of numbers.
+fn append<T: Copy, const N: usize>(bytes: &mut Vec<u8>, numbers: &[T], to_bytes: impl Fn(T) -> [u8; N]) {
+    let start = bytes.len();
+    bytes.resize(start + N * numbers.len(), 0);
+    let (places, _) = bytes[start..].as_chunks_mut::<N>();
+    places.iter_mut().zip(numbers).for_each(|(place, &number)| *place = to_bytes(number));
+}
+
+/// The nearest halves, ties to even; numbers beyond the largest half become it, and are counted.
+fn round_to_halves(numbers: &mut [f32], halves: &mut Vec<f16>) -> u64 {
+    let clamped = numbers.iter().map(|&number| u64::from(number > HALF_MAX)).sum();
     numbers.iter_mut().for_each(|number| *number = number.min(HALF_MAX));
     halves.resize(numbers.len(), f16::ZERO);
     halves.convert_from_f32_slice(numbers);
+    clamped
 }
 
 /// Primaries and white of Rec. 709 (ITU-R BT.709-6, 1.3 and 1.4).
