@@ -7,6 +7,7 @@
 //! keys = "/etc/tessera/coordinator-coordinator.pem"
 //! web = "127.0.0.1:7180"          # the status page
 //! no_node_timeout = 60.0          # seconds
+//! free_bytes = 1073741824         # stay free on the disk: jobs that would need them are refused
 //!
 //! [node]
 //! coordinator = "farm.example:7143"
@@ -52,6 +53,8 @@ pub struct CoordinatorConfig {
     pub web: Option<SocketAddr>,
     /// Seconds that a job waits for any node.
     pub no_node_timeout: Option<f64>,
+    /// Bytes that stay free on its disk.
+    pub free_bytes: Option<u64>,
 }
 
 /// Settings of `tessera node`.

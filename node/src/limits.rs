@@ -91,6 +91,12 @@ pub const JOURNAL_BATCH: usize = 1024;
 /// Pause before a write is tried again that the disk refused.
 pub const DISK_RETRY: Duration = Duration::from_secs(1);
 
+/// How often the coordinator looks how much room its disk has.
+pub const SPACE_INTERVAL: Duration = Duration::from_secs(5);
+
+/// Bytes that stay free on the coordinator's disk, if it is not told otherwise: jobs that would need them are refused.
+pub const FREE_BYTES: u64 = 1 << 30;
+
 /// How often the farm's status is published to those who watch.
 pub const STATUS_INTERVAL: Duration = Duration::from_millis(100);
 

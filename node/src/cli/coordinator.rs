@@ -17,7 +17,7 @@ use crate::{
     coordinator::{Coordinator, Options},
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
-    limits::NO_NODE_TIMEOUT,
+    limits::{FREE_BYTES, NO_NODE_TIMEOUT},
     web,
     wire::tls::{Identity, Role},
 };
@@ -55,6 +55,7 @@ pub fn run(args: Args) -> Result<()> {
         data: required(args.data.or(file.data), "--data", "coordinator.data")?,
         identity: Identity::load(&required(args.keys.or(file.keys), "--keys", "coordinator.keys")?, Role::Coordinator)?,
         farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
+        free_bytes: file.free_bytes.unwrap_or(FREE_BYTES),
     };
     let web = args.web.or(file.web);
     runtime()?.block_on(async {
@@ -69,7 +70,7 @@ pub fn run(args: Args) -> Result<()> {
             if let Ok(address) = listener.local_addr() {
                 println!("status page at http://{address}/");
             }
-            tokio::spawn(web::serve(listener, coordinator.page(), async { drop(stopped.await) }));
+            tokio::spawn(web::serve(listener, coordinator.page(), coordinator.metrics.clone(), async { drop(stopped.await) }));
         }
         notify(NotifyState::Ready);
         let feeding = tokio::spawn(feed_watchdog(coordinator.status.clone()));

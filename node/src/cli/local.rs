@@ -41,6 +41,7 @@ impl LocalFarm {
             data: folder.path().join("data"),
             identity: authority.issue(Role::Coordinator, "coordinator")?,
             farm,
+            free_bytes: 0,
         };
         let coordinator = Coordinator::start(options).await?;
         let client = authority.issue(Role::Client, "render")?;

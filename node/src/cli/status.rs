@@ -40,6 +40,7 @@ pub fn run(args: Args) -> Result<()> {
 }
 
 fn print_tables(status: &Status) {
+    status.refusal.iter().for_each(|refusal| println!("no job is taken now: {refusal}\n"));
     let heads = |heads: &[&str]| heads.iter().map(|head| (*head).to_owned()).collect::<Vec<_>>();
     let nodes = status.nodes.iter().map(node);
     let rows: Vec<_> = std::iter::once(heads(&["node", "lanes", "holds", "state", "address"])).chain(nodes).collect();
@@ -65,7 +66,7 @@ fn node(node: &NodeStatus) -> Vec<String> {
 fn job(job: &JobStatus) -> Vec<String> {
     let state = match &job.state {
         JobState::Failed(reason) | JobState::Cancelled(reason) => format!("{}: {reason}", word(&job.state)),
-        state => word(state).to_owned(),
+        state => [Some(word(state)), job.trouble.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(": "),
     };
     vec![job.name.clone(), job.job.0.to_string(), format!("{}/{}", job.committed, job.parts), format!("{:.1}", job.seconds), state]
 }

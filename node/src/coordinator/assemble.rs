@@ -2,6 +2,7 @@
 
 use std::{
     path::PathBuf,
+    sync::Arc,
     time::{Duration, Instant, UNIX_EPOCH},
 };
 
@@ -15,7 +16,7 @@ use super::{disk::Pixels, store::StoredJob};
 use crate::{
     farm::{JobId, JobRecord, LeaseId},
     job::{JobDescription, PixelType},
-    manifest::{self, ImageEntry, Submission},
+    manifest::{self, ImageEntry, ReportEntry, Submission},
     schedule::{Assign, PartId, Split},
 };
 
@@ -24,7 +25,7 @@ pub struct Assembly {
     /// The job.
     pub job: JobId,
     /// What was submitted.
-    pub stored: StoredJob,
+    pub stored: Arc<StoredJob>,
     /// What happened.
     pub record: JobRecord,
     /// Where the pixels are.
@@ -43,16 +44,16 @@ pub enum Refusal {
     Files(String),
 }
 
-/// Writes EXR, PNG and manifest, each whole or not at all; the manifest last, so that where it stands all stand.
+/// Writes EXR, PNG and manifest, each whole or not at all; the manifest last, so that where it stands all stand. Returns what came of the job.
 ///
 /// # Errors
 /// Pixels that cannot be read back, or a disk that refuses.
-pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<(), Refusal> {
+pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<ReportEntry, Refusal> {
     let film = film(assembly, pixels).map_err(Refusal::Pixels)?;
     write_files(assembly, &film).map_err(Refusal::Files)
 }
 
-fn write_files(assembly: &Assembly, film: &Film) -> Result<(), String> {
+fn write_files(assembly: &Assembly, film: &Film) -> Result<ReportEntry, String> {
     let image = write_pictures(&assembly.stored.description, film, &assembly.files)?;
     let Assembly { job, stored, record, .. } = assembly;
     let submission = Submission {
@@ -64,7 +65,8 @@ fn write_files(assembly: &Assembly, film: &Film) -> Result<(), String> {
     };
     let total = record.seconds + assembly.made.elapsed().as_secs_f64();
     let manifest = manifest::build(submission, image, facts(&stored.description, record.clone()), total);
-    manifest::write(&assembly.files.join(&stored.description.output.manifest), &manifest).map_err(|error| error.to_string())
+    manifest::write(&assembly.files.join(&stored.description.output.manifest), &manifest).map_err(|error| error.to_string())?;
+    Ok(manifest.report)
 }
 
 fn film(assembly: &Assembly, pixels: &Pixels) -> Result<Film, String> {

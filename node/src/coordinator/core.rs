@@ -3,11 +3,9 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::Arc,
-    thread,
-    time::{Duration, Instant, SystemTime, UNIX_EPOCH},
+    time::{Duration, Instant},
 };
 
-use tessera_engine::part;
 use tokio::{
     sync::{mpsc, watch},
     time::{Instant as TokioInstant, sleep_until},
@@ -15,71 +13,68 @@ use tokio::{
 
 use super::{
     Shared,
-    assemble::{self, Assembly, Refusal},
+    canary::Canary,
     disk::Disk,
     input::{Input, LinkId, Outgoing},
+    jobs::{Known, Unanswered},
     leases::Lease,
     policy::Thinker,
     status::{self, Times},
-    store::StoredJob,
 };
 use crate::{
     error::Result,
-    farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, JobSpec, LeaseId, NodeInfo},
-    job::JobDescription,
-    limits::{DISK_RETRY, INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
+    farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId, NodeInfo},
+    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
     schedule::NodeId,
     web::Snapshot,
-    wire::{FromNode, Hello, PartHeader, Status, ToNode, tls},
+    wire::{FromNode, Hello, PartHeader, Status, ToNode},
 };
 
 /// A node's latest connection.
-struct Link {
+pub struct Link {
     id: LinkId,
     incarnation: Incarnation,
     outgoing: mpsc::Sender<Outgoing>,
+    /// When it last gave a sign of life, and whether it was suspected or given up since.
+    heard: Instant,
+    suspected: bool,
+    dead: bool,
+}
+
+/// Pixels that came in.
+pub struct Arrived {
+    /// Taken out on their way to the disk.
+    bytes: Vec<u8>,
+    length: usize,
+    at: Instant,
 }
 
 /// The core and what stands around it.
 pub struct Core {
-    farm: Farm,
+    pub(super) farm: Farm,
     /// What the farm's clock showed when this process began.
-    offset: Duration,
-    begin: Instant,
-    shared: Shared,
-    disk: Disk,
-    thinker: Thinker,
-    canary: Canary,
-    links: BTreeMap<NodeId, Link>,
-    nodes: BTreeMap<LinkId, NodeId>,
-    ids: BTreeMap<String, NodeId>,
-    jobs: BTreeMap<JobId, StoredJob>,
-    times: BTreeMap<JobId, Times>,
+    pub(super) offset: Duration,
+    pub(super) begin: Instant,
+    pub(super) shared: Shared,
+    pub(super) disk: Disk,
+    pub(super) thinker: Thinker,
+    pub(super) canary: Canary,
+    pub(super) links: BTreeMap<NodeId, Link>,
+    pub(super) nodes: BTreeMap<LinkId, NodeId>,
+    pub(super) ids: BTreeMap<String, NodeId>,
+    pub(super) jobs: BTreeMap<JobId, Known>,
+    /// Who waits to hear that a job is taken.
+    pub(super) unanswered: Unanswered,
+    /// Why the disk takes no events and pixels.
+    pub(super) disk_trouble: Option<String>,
+    /// Why there is no room for more jobs.
+    pub(super) no_space: Option<String>,
+    pub(super) times: BTreeMap<JobId, Times>,
     /// Pixels that came in and are neither on disk nor given up.
-    pixels: BTreeMap<(JobId, LeaseId), Vec<u8>>,
-    published: watch::Sender<Arc<Status>>,
+    pub(super) pixels: BTreeMap<(JobId, LeaseId), Arrived>,
+    pub(super) published: watch::Sender<Arc<Status>>,
     /// Whether more than a sign of life has come since the status was published.
-    changed: bool,
-}
-
-/// The canary part: whoever renders it to the same bytes may render others.
-#[derive(Clone, Copy)]
-pub struct Canary {
-    /// Chooses it.
-    pub seed: u64,
-    /// What it comes to here.
-    pub hash: [u8; 32],
-}
-
-impl Canary {
-    /// Renders it.
-    ///
-    /// # Errors
-    /// In words, when it cannot be rendered here.
-    pub fn render() -> std::result::Result<Self, String> {
-        let seed = tls::random();
-        Ok(Self { seed, hash: part::canary_hash(seed).map_err(|error| error.to_string())? })
-    }
+    pub(super) changed: bool,
 }
 
 impl Core {
@@ -96,10 +91,16 @@ impl Core {
         published: watch::Sender<Arc<Status>>,
     ) -> Result<Self> {
         let ids = farm.nodes().into_iter().map(|node| (node.name, node.id)).collect();
-        let known = farm.jobs().into_iter().filter_map(|job| Some((job.id, shared.store.get_job(job.id).ok()?)));
-        let jobs: BTreeMap<JobId, StoredJob> = known.collect();
-        let begun = farm.jobs().into_iter().filter(|job| job.outcome.is_none() && job.phase != JobPhase::Waiting);
-        begun.filter_map(|job| jobs.get_key_value(&job.id)).for_each(|(id, job)| thinker.load(*id, &job.description));
+        let known = farm.jobs().into_iter().filter_map(|job| Some((job.id, Known::new(shared.store.get_job(job.id).ok()?))));
+        let mut jobs: BTreeMap<JobId, Known> = known.collect();
+        for job in farm.jobs() {
+            let Some(known) = jobs.get_mut(&job.id) else { continue };
+            match &known.stored {
+                _ if job.outcome.is_some() => known.stored = None,
+                Some(stored) if job.phase != JobPhase::Waiting => thinker.load(job.id, &stored.description),
+                _ => {}
+            }
+        }
         let mut core = Self {
             offset: farm.now(),
             farm,
@@ -112,6 +113,9 @@ impl Core {
             nodes: BTreeMap::new(),
             ids,
             jobs,
+            unanswered: BTreeMap::new(),
+            disk_trouble: None,
+            no_space: None,
             times: BTreeMap::new(),
             pixels: BTreeMap::new(),
             published,
@@ -144,7 +148,9 @@ impl Core {
                     if received == 0 {
                         return;
                     }
+                    self.shared.metrics.inputs_waiting.set(i64::try_from(received + inputs.len()).unwrap_or(i64::MAX));
                     waiting.drain(..).for_each(|input| self.handle(input));
+                    self.shared.metrics.inputs_waiting.set(i64::try_from(inputs.len()).unwrap_or(i64::MAX));
                 }
                 () = sleep_until(deadline.unwrap_or(self.begin).into()), if deadline.is_some() => {}
                 () = sleep_until(publish), if self.changed => {}
@@ -172,6 +178,13 @@ impl Core {
             all.into_iter().for_each(|(node, incarnation)| self.step(Event::NodeHeard { node, incarnation }));
         }
         self.step(Event::Tick);
+        for (node, link) in &mut self.links {
+            let suspected = self.farm.is_suspected(*node);
+            if suspected && !link.suspected {
+                self.shared.metrics.suspected(link.heard.elapsed());
+            }
+            link.suspected = suspected;
+        }
     }
 
     fn handle(&mut self, input: Input) {
@@ -189,6 +202,13 @@ impl Core {
                 Some(Event::RenderFailed { node, incarnation, job, lease, reason: "its pixels do not agree with their hash".to_owned() })
             }),
             Input::Gone(link, left) => self.gone(link, left),
+            Input::HeldUp(job, reason) => self.held_up(job, reason),
+            Input::Disk(trouble) => self.disk_refuses(trouble),
+            Input::Space(trouble) => {
+                trouble.iter().for_each(|trouble| tracing::warn!(trouble, "no job is taken"));
+                self.no_space = trouble;
+                self.changed = true;
+            }
             Input::Assemble(job) => {
                 if self.farm.jobs().iter().any(|known| known.id == job && known.phase == JobPhase::Assembling) {
                     self.assemble(job);
@@ -196,14 +216,20 @@ impl Core {
             }
             Input::Event(event) => {
                 if let Event::Committed { job, lease } = event {
+                    if let Some(arrived) = self.pixels.get(&(job, lease)) {
+                        self.shared.metrics.committed(arrived.length, arrived.at.elapsed());
+                    }
                     self.settle(job, lease);
                 }
                 self.step(event);
             }
-            Input::Submit { description, min_nodes, reply } => {
-                let submitted = self.submit(*description, min_nodes);
-                // Taken is what is on disk. Whoever asked may have gone meanwhile.
-                self.disk.then(move || drop(reply.send(submitted)));
+            Input::Submit { description, min_nodes, reply } => match self.submit(*description, min_nodes) {
+                Ok(job) => self.answer_when_taken(job, reply),
+                Err(reason) => drop(reply.send(Err(reason))),
+            },
+            Input::Taken(job) => {
+                // Whoever asked may have gone meanwhile.
+                self.unanswered.remove(&job).into_iter().for_each(|reply| drop(reply.send(Ok(job))));
             }
             Input::Cancel { job, reason, reply } => {
                 let running = self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none());
@@ -223,6 +249,9 @@ impl Core {
 
     fn of(&mut self, link: LinkId, act: impl FnOnce(&mut Self, NodeId, Incarnation) -> Option<Event>) {
         let Some((node, incarnation)) = self.at(link) else { return };
+        if let Some(link) = self.links.get_mut(&node) {
+            (link.heard, link.suspected) = (Instant::now(), false);
+        }
         if let Some(event) = act(self, node, incarnation) {
             self.step(event);
         }
@@ -234,7 +263,10 @@ impl Core {
         let incarnation = hello.incarnation;
         tracing::info!(node = name, address, lanes = hello.lanes, build = hello.build, "a node joined");
         self.nodes.insert(id, node);
-        self.links.insert(node, Link { id, incarnation, outgoing });
+        let link = Link { id, incarnation, outgoing, heard: Instant::now(), suspected: false, dead: false };
+        if self.links.insert(node, link).is_some_and(|earlier| earlier.incarnation != incarnation && !earlier.dead) {
+            self.shared.metrics.deaths.inc();
+        }
         let info = NodeInfo { name, lanes: hello.lanes, build: hello.build, address };
         self.step(Event::NodeJoined { node, incarnation, info });
         if hello.revision != tessera_engine::REVISION {
@@ -279,7 +311,7 @@ impl Core {
         if self.pixels.contains_key(&(job, lease)) {
             return Some(Event::NodeHeard { node, incarnation });
         }
-        self.pixels.insert((job, lease), bytes);
+        self.pixels.insert((job, lease), Arrived { length: bytes.len(), bytes, at: Instant::now() });
         Some(Event::Rendered { node, incarnation, job, lease, hash, seconds })
     }
 
@@ -293,28 +325,28 @@ impl Core {
         }
     }
 
-    fn submit(&mut self, description: JobDescription, min_nodes: u32) -> std::result::Result<JobId, String> {
-        let words = |error: &dyn std::fmt::Display| format!("the job could not be stored: {error}");
-        let job = self.shared.store.next_job().map_err(|error| words(&error))?;
-        let frame = postcard::to_stdvec(&description.frame).map_err(|error| words(&error))?;
-        let frame = self.shared.store.put(&frame).map_err(|error| words(&error))?;
-        let submitted = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
-        let spec = spec(&description, min_nodes);
-        let stored = StoredJob { description, frame, submitted };
-        self.shared.store.put_job(job, &stored).map_err(|error| words(&error))?;
-        tracing::info!(job = job.0, name = stored.description.name, "a job was submitted");
-        self.jobs.insert(job, stored);
-        self.step(Event::JobSubmitted { job, spec });
-        self.publish();
-        Ok(job)
-    }
-
-    fn step(&mut self, event: Event) {
+    pub(super) fn step(&mut self, event: Event) {
         let now = self.offset + self.begin.elapsed();
         self.changed |= !matches!(event, Event::NodeHeard { .. });
         self.disk.note(&self.farm, now, &event);
+        self.shared.metrics.events.inc();
+        let silence = matches!(event, Event::Tick);
         for command in self.farm.step(now, event) {
+            if let Command::Close { node, incarnation, .. } = &command {
+                self.sent_away(*node, *incarnation, silence);
+            }
             self.carry_out(command);
+        }
+    }
+
+    /// A node is sent away: it was silent for too long, may not render, or has a newer life.
+    fn sent_away(&mut self, node: NodeId, incarnation: Incarnation, silence: bool) {
+        let latest = self.links.get_mut(&node).filter(|link| link.incarnation == incarnation);
+        if silence {
+            self.shared.metrics.deaths.inc();
+            latest.into_iter().for_each(|link| link.dead = true);
+        } else if latest.is_some() {
+            self.shared.metrics.refused_peers.inc();
         }
     }
 
@@ -329,14 +361,15 @@ impl Core {
             Command::AskPolicy { id, job, question } => self.thinker.ask(id, job, question),
             Command::Commit { job, part, lease } => {
                 // What stays is the name alone, so that a second delivery is known as one.
-                if let Some(bytes) = self.pixels.get_mut(&(job, lease)) {
-                    self.disk.commit(job, part, lease, std::mem::take(bytes));
+                if let Some(arrived) = self.pixels.get_mut(&(job, lease)) {
+                    self.disk.commit(job, part, lease, std::mem::take(&mut arrived.bytes));
                 }
             }
             Command::Discard { job, lease, reason } => self.discard(job, lease, reason),
             Command::Assemble { job } => self.assemble(job),
             Command::End { job, outcome } => {
                 tracing::info!(job = job.0, ?outcome, "a job ended");
+                self.ended(job, &outcome);
                 self.shared.leases.remove_job(job);
                 self.pixels.retain(|(other, _), _| *other != job);
                 self.thinker.forget(job);
@@ -350,13 +383,16 @@ impl Core {
         Some(match message {
             farm::ToNode::Prove => ToNode::Prove { seed: self.canary.seed },
             farm::ToNode::Prepare { job } => {
-                let stored = self.jobs.get(&job)?;
+                let stored = self.jobs.get(&job)?.stored.as_ref()?;
                 self.thinker.load(job, &stored.description);
                 ToNode::Prepare { job, frame: stored.frame, assets: stored.description.assets.clone() }
             }
             farm::ToNode::Probe { job, cells, stride } => ToNode::Probe { job, cells, stride },
             farm::ToNode::Render { job, lease, rect, samples } => {
-                self.shared.leases.add(job, lease, Lease { node, incarnation, frame: self.jobs.get(&job)?.frame, rect });
+                let frame = self.jobs.get(&job)?.stored.as_ref()?.frame;
+                if self.shared.leases.add(job, lease, Lease { node, incarnation, frame, rect }) {
+                    self.shared.metrics.attempts.inc();
+                }
                 ToNode::Render { job, lease, rect, samples }
             }
             farm::ToNode::Cancel { job, lease } => ToNode::Cancel { job, lease },
@@ -396,49 +432,17 @@ impl Core {
         self.settle(job, lease);
     }
 
-    fn assemble(&mut self, job: JobId) {
-        let (Some(stored), Some(record)) = (self.jobs.get(&job).cloned(), self.farm.record(job)) else { return };
-        let assembly =
-            Assembly { job, stored, record, parts: self.farm.committed(job), files: self.shared.store.files(job), made: Instant::now() };
-        let (pixels, inputs) = (self.disk.pixels.clone(), self.shared.inputs.clone());
-        tokio::task::spawn_blocking(move || {
-            let input = match assemble::write(&assembly, &pixels) {
-                Ok(()) => Input::Event(Event::Assembled { job, result: Ok(()) }),
-                Err(Refusal::Pixels(reason)) => Input::Event(Event::Assembled { job, result: Err(reason) }),
-                Err(Refusal::Files(reason)) => {
-                    tracing::error!(job = job.0, reason, "the job keeps its parts until the disk takes its files");
-                    thread::sleep(DISK_RETRY);
-                    Input::Assemble(job)
-                }
-            };
-            drop(inputs.blocking_send(input));
-        });
-    }
-
-    fn publish(&mut self) {
+    pub(super) fn publish(&mut self) {
         self.changed = false;
-        let status = status::of(&self.farm, &mut self.times, self.offset + self.begin.elapsed());
+        let (now, refusal) = (self.offset + self.begin.elapsed(), self.refusal());
+        let status =
+            status::of(&self.farm, &mut self.times, now, refusal.clone(), |id| self.jobs.get(&id).map(|known| known.trouble.clone()));
         if *self.published.borrow().as_ref() != status {
             self.published.send_replace(Arc::new(status));
         }
         if self.shared.page.receiver_count() > 0 {
-            let film =
-                |id| self.jobs.get(&JobId(id)).map_or((0, 0), |job| (job.description.frame.film.width, job.description.frame.film.height));
-            self.shared.page.send_replace(Arc::new(Snapshot::of(&self.farm, film)));
+            let seen = |id| self.jobs.get(&id).map(|known| (known.size, known.trouble.clone()));
+            self.shared.page.send_replace(Arc::new(Snapshot::of(&self.farm, refusal, seen)));
         }
-    }
-}
-
-fn spec(description: &JobDescription, min_nodes: u32) -> JobSpec {
-    let JobDescription { name, frame, probe, split, assign, .. } = description;
-    JobSpec {
-        name: name.clone(),
-        width: frame.film.width,
-        height: frame.film.height,
-        samples: u64::from(frame.quality.samples),
-        probe: probe.clone(),
-        split: split.clone(),
-        assign: *assign,
-        min_nodes: min_nodes.max(1),
     }
 }

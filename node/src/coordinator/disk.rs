@@ -19,6 +19,7 @@ use crate::{
     journal::{Filter, Journal},
     limits::{DISK_RETRY, JOURNAL_BATCH},
     schedule::PartId,
+    web::Metrics,
 };
 
 /// What the thread does, in this order.
@@ -33,6 +34,7 @@ enum Deed {
 pub struct Disk {
     deeds: Sender<Deed>,
     filter: Filter,
+    metrics: Arc<Metrics>,
     /// For reading pixels back.
     pub pixels: Pixels,
 }
@@ -68,17 +70,18 @@ impl Disk {
     ///
     /// # Errors
     /// When the journal cannot be read, or another process holds it.
-    pub fn open(folder: &Path, config: FarmConfig, inputs: InputSender<Input>) -> Result<(Self, Farm)> {
+    pub fn open(folder: &Path, config: FarmConfig, inputs: InputSender<Input>, metrics: Arc<Metrics>) -> Result<(Self, Farm)> {
         let (journal, recovered) = Journal::open(&folder.join("journal"), config)?;
         if recovered.events > 0 {
             tracing::info!(events = recovered.events, "the journal was replayed");
         }
         let pixels = Pixels(Arc::new(Mutex::new(journal)));
         let (deeds, received) = mpsc::channel();
-        let thread = Writer { pixels: pixels.clone(), inputs };
+        let mut thread = Writer { pixels: pixels.clone(), inputs, metrics: metrics.clone(), trouble: None };
+        thread.measure();
         let started = thread::Builder::new().name("journal".to_owned()).spawn(move || thread.run(&received));
         started.map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))?;
-        Ok((Self { deeds, filter: Filter::default(), pixels }, recovered.farm))
+        Ok((Self { deeds, filter: Filter::default(), metrics, pixels }, recovered.farm))
     }
 
     /// Notes an event that `farm` is about to take.
@@ -105,6 +108,7 @@ impl Disk {
     }
 
     fn send(&self, deed: Deed) {
+        self.metrics.disk_waiting.inc();
         if self.deeds.send(deed).is_err() {
             tracing::error!("the journal's thread is gone: nothing is stored any more");
         }
@@ -114,11 +118,14 @@ impl Disk {
 struct Writer {
     pixels: Pixels,
     inputs: InputSender<Input>,
+    metrics: Arc<Metrics>,
+    /// Why the disk takes nothing, as the core was told.
+    trouble: Option<String>,
 }
 
 impl Writer {
     /// Takes what waits, writes it, waits for the disk once, then says what is done.
-    fn run(&self, deeds: &Receiver<Deed>) {
+    fn run(&mut self, deeds: &Receiver<Deed>) {
         while let Ok(first) = deeds.recv() {
             let batch = std::iter::once(first).chain(deeds.try_iter().take(JOURNAL_BATCH));
             if !self.write(batch) {
@@ -127,35 +134,65 @@ impl Writer {
         }
     }
 
-    fn write(&self, batch: impl Iterator<Item = Deed>) -> bool {
-        let mut stored = Vec::new();
+    fn write(&mut self, batch: impl Iterator<Item = Deed>) -> bool {
+        let (mut stored, mut over) = (Vec::new(), Vec::new());
         let mut then: Vec<Box<dyn FnOnce() + Send>> = Vec::new();
         for deed in batch {
+            self.metrics.disk_waiting.dec();
             match deed {
                 Deed::Note(entries) => self.pixels.lock().append(entries),
                 Deed::Store(job, part, lease, bytes) => {
-                    retry(|| self.pixels.lock().store_pixels(job, part, lease, &bytes));
+                    self.retry(|journal| journal.store_pixels(job, part, lease, &bytes));
                     stored.push(Event::Committed { job, lease });
                 }
                 Deed::Then(act) => then.push(act),
-                Deed::Forget(job) => {
-                    if let Err(error) = self.pixels.lock().release_pixels(job) {
-                        tracing::warn!(%error, "pixels of a job that is over stay");
-                    }
-                }
+                Deed::Forget(job) => over.push(job),
             }
         }
-        retry(|| self.pixels.lock().sync());
-        retry(|| self.pixels.lock().sync_pixels());
+        self.retry(Journal::sync);
+        self.retry(Journal::sync_pixels);
         then.into_iter().for_each(|act| act());
+        // Only now: until the end of a job is on disk, a start would go on with it.
+        over.into_iter().for_each(|job| self.release(job));
+        self.measure();
         stored.into_iter().all(|event| self.inputs.blocking_send(Input::Event(event)).is_ok())
     }
-}
 
-/// A disk that is full has room again some time: nothing is given up, and nothing is acknowledged before.
-fn retry(mut write: impl FnMut() -> Result<()>) {
-    while let Err(error) = write() {
-        tracing::error!(%error, "nothing is acknowledged until the disk takes it");
-        thread::sleep(DISK_RETRY);
+    /// A disk that is full has room again some time: nothing is given up, and nothing is acknowledged before.
+    fn retry(&mut self, mut write: impl FnMut(&mut Journal) -> Result<()>) {
+        let pixels = self.pixels.clone();
+        loop {
+            let written = write(&mut pixels.lock());
+            let Err(error) = written else { break };
+            self.metrics.disk_refusals.inc();
+            self.tell(Some(error.message));
+            thread::sleep(DISK_RETRY);
+        }
+        self.tell(None);
+    }
+
+    /// Tells the core and the log when the disk begins to refuse, and when it takes again.
+    fn tell(&mut self, trouble: Option<String>) {
+        if trouble == self.trouble {
+            return;
+        }
+        match &trouble {
+            Some(error) => tracing::error!(error, "nothing is acknowledged until the disk takes it"),
+            None => tracing::info!("the disk takes what it is given again"),
+        }
+        self.trouble.clone_from(&trouble);
+        let _ = self.inputs.blocking_send(Input::Disk(trouble));
+    }
+
+    fn release(&self, job: JobId) {
+        if let Err(error) = self.pixels.lock().release_pixels(job) {
+            tracing::warn!(%error, "pixels of a job that is over stay");
+        }
+    }
+
+    fn measure(&self) {
+        let (events, bytes) = self.pixels.lock().size();
+        self.metrics.journal_events.set(events);
+        self.metrics.journal_bytes.set(bytes);
     }
 }

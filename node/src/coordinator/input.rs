@@ -48,8 +48,14 @@ pub enum Input {
     Damaged(LinkId, JobId, LeaseId),
     /// A connection ended; where the node left, or was sent away, with the reason.
     Gone(LinkId, Option<String>),
+    /// Files of a job cannot be written, for this reason.
+    HeldUp(JobId, String),
     /// Files of a job could not be written: it is time to try again.
     Assemble(JobId),
+    /// Why the disk takes no events and pixels, or that it takes them again.
+    Disk(Option<String>),
+    /// That the disk is too full for more jobs, or that it has room again.
+    Space(Option<String>),
     /// The rest of the program has an event for the core.
     Event(Event),
     /// A client hands in a job whose assets are all here.
@@ -61,6 +67,8 @@ pub enum Input {
         /// The job's number, or why it is refused.
         reply: oneshot::Sender<Result<JobId, String>>,
     },
+    /// All that was said of a submitted job is on disk.
+    Taken(JobId),
     /// A client ends a job.
     Cancel {
         /// The job.

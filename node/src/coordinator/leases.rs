@@ -34,9 +34,9 @@ impl Leases {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// An attempt is handed out.
-    pub fn add(&self, job: JobId, id: LeaseId, lease: Lease) {
-        self.lock().insert((job, id), lease);
+    /// An attempt is handed out; says whether for the first time.
+    pub fn add(&self, job: JobId, id: LeaseId, lease: Lease) -> bool {
+        self.lock().insert((job, id), lease).is_none()
     }
 
     /// An attempt that is handed out.

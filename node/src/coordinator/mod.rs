@@ -1,15 +1,19 @@
 //! The coordinator: the shell around the farm's core. Sockets, clock, disk and policies stand here; decisions stand in [`crate::farm`].
 
 mod assemble;
+mod canary;
 mod core;
 mod disk;
+mod housekeeping;
 mod input;
+mod jobs;
 mod leases;
 mod policy;
 mod requests;
 mod session;
 mod status;
 mod store;
+mod submission;
 
 use std::{net::SocketAddr, path::PathBuf, sync::Arc};
 
@@ -21,19 +25,12 @@ use tokio::{
 };
 
 pub use self::assemble::write_pictures;
-use self::{
-    core::{Canary, Core},
-    disk::Disk,
-    input::Input,
-    leases::Leases,
-    policy::Thinker,
-    store::Store,
-};
+use self::{canary::Canary, core::Core, disk::Disk, input::Input, leases::Leases, policy::Thinker, store::Store};
 use crate::{
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
     limits::EVENT_QUEUE,
-    web::Snapshot,
+    web::{Metrics, Snapshot},
     wire::{
         self, CLOSE_ANEW, CLOSE_RESUME, Status,
         tls::{Identity, Peer, Role, peer},
@@ -50,6 +47,8 @@ pub struct Options {
     pub identity: Identity,
     /// Timeouts.
     pub farm: FarmConfig,
+    /// Bytes that stay free on its disk.
+    pub free_bytes: u64,
 }
 
 /// What every connection needs.
@@ -61,6 +60,7 @@ struct Shared {
     status: watch::Receiver<Arc<Status>>,
     /// What the status page shows; made only while somebody may look.
     page: watch::Sender<Arc<Snapshot>>,
+    metrics: Arc<Metrics>,
 }
 
 impl Shared {
@@ -78,9 +78,11 @@ pub struct Coordinator {
     pub address: SocketAddr,
     /// How nodes and jobs stand.
     pub status: watch::Receiver<Arc<Status>>,
+    /// What is counted and timed.
+    pub metrics: Arc<Metrics>,
     page: watch::Sender<Arc<Snapshot>>,
     endpoint: Endpoint,
-    tasks: [JoinHandle<()>; 2],
+    tasks: [JoinHandle<()>; 3],
 }
 
 impl Coordinator {
@@ -92,18 +94,21 @@ impl Coordinator {
         let folder = |error: std::io::Error| Error::new(ExitCode::File, format!("{}: {error}", options.data.display()));
         let endpoint = wire::server(options.listen, &options.identity)?;
         let address = endpoint.local_addr().map_err(|error| Error::new(ExitCode::Farm, error.to_string()))?;
-        let store = Store::open(&options.data).map_err(folder)?;
+        let store = Store::open(&options.data, options.free_bytes).map_err(folder)?;
         let (inputs, received) = mpsc::channel(EVENT_QUEUE);
-        let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone())?;
+        let metrics = Arc::new(Metrics::default());
+        let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone(), metrics.clone())?;
         let thinker = Thinker::new(inputs.clone());
         let canary = tokio::task::spawn_blocking(Canary::render).await.map_err(|error| error.to_string()).and_then(|canary| canary);
         let canary = canary.map_err(|error| Error::new(ExitCode::Internal, format!("the canary part cannot be rendered: {error}")))?;
         let (published, status) = watch::channel(Arc::default());
         let page = watch::Sender::new(Arc::default());
-        let shared = Shared { inputs, store, leases: Leases::default(), status: status.clone(), page: page.clone() };
+        let shared =
+            Shared { inputs, store, leases: Leases::default(), status: status.clone(), page: page.clone(), metrics: metrics.clone() };
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
-        let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared))];
-        Ok(Self { address, status, page, endpoint, tasks })
+        let keeping = tokio::spawn(housekeeping::keep(shared.clone()));
+        let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping];
+        Ok(Self { address, status, metrics, page, endpoint, tasks })
     }
 
     /// What the status page shows. From now on it is made.
@@ -130,7 +135,10 @@ async fn serve(shared: Shared, incoming: Incoming) {
     let address = incoming.remote_address();
     let connection = match incoming.await {
         Ok(connection) => connection,
-        Err(error) => return tracing::warn!(%address, %error, "a peer was refused"),
+        Err(error) => {
+            shared.metrics.refused_peers.inc();
+            return tracing::warn!(%address, %error, "a peer was refused");
+        }
     };
     let identity = connection.peer_identity().and_then(|identity| identity.downcast::<Vec<CertificateDer<'static>>>().ok());
     let peer = identity.as_ref().and_then(|chain| chain.first()).ok_or("no certificate".to_owned()).and_then(peer);
@@ -139,6 +147,7 @@ async fn serve(shared: Shared, incoming: Incoming) {
         Ok(Peer { role: Role::Client, name }) => requests::serve(shared, connection, name).await,
         Ok(Peer { role: Role::Coordinator, .. }) => connection.close(CLOSE_ANEW.into(), b"there is a coordinator already"),
         Err(error) => {
+            shared.metrics.refused_peers.inc();
             tracing::warn!(%address, error, "a peer was refused");
             connection.close(CLOSE_ANEW.into(), error.as_bytes());
         }

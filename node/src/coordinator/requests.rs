@@ -5,11 +5,11 @@ use std::{io, path::Path};
 use quinn::{Connection, RecvStream, SendStream};
 use tokio::{io::AsyncWriteExt, sync::oneshot};
 
-use super::{Shared, input::Input};
+use super::{Shared, input::Input, submission};
 use crate::{
     farm::JobId,
-    job::{JobDescription, Output},
-    limits::{PIXELS_PER_FRAME, REQUEST_BYTES, RESPONSE_BYTES},
+    job::JobDescription,
+    limits::{REQUEST_BYTES, RESPONSE_BYTES},
     wire::{self, FileHeader, FrameError, Request, Response},
 };
 
@@ -56,7 +56,7 @@ async fn submit(
     send: &mut SendStream,
     receive: &mut RecvStream,
 ) -> Result<(), FrameError> {
-    if let Err(reason) = check(&description) {
+    if let Err(reason) = may_submit(shared, &description).await {
         return say(send, &Response::Refused { reason }).await;
     }
     let wanted: Vec<_> = description.assets.iter().copied().filter(|id| !shared.store.asset(*id).exists()).collect();
@@ -71,24 +71,13 @@ async fn submit(
     say(send, &submitted.map_or_else(|reason| Response::Refused { reason }, |job| Response::Submitted { job })).await
 }
 
-/// What a client of another make could get wrong.
-fn check(description: &JobDescription) -> Result<(), String> {
-    let Output { exr, png, manifest, .. } = &description.output;
-    let names: Vec<&String> = [exr, manifest].into_iter().chain(png).collect();
-    for (i, name) in names.iter().enumerate() {
-        if !wire::is_plain_name(name) {
-            return Err(format!("the output {name:?} is no plain file name"));
-        }
-        if names[..i].contains(name) {
-            return Err(format!("two outputs are named {name:?}"));
-        }
-    }
-    let film = &description.frame.film;
+/// Whether a job is taken: it is as it should be, and there is room for it.
+async fn may_submit(shared: &Shared, description: &JobDescription) -> Result<(), String> {
+    submission::check(description)?;
+    shared.status.borrow().refusal.clone().map_or(Ok(()), Err)?;
+    let (store, film) = (shared.store.clone(), &description.frame.film);
     let pixels = u64::from(film.width) * u64::from(film.height);
-    if pixels == 0 || pixels > PIXELS_PER_FRAME {
-        return Err(format!("a frame of {} x {} pixels; 1 to {PIXELS_PER_FRAME} pixels are allowed", film.width, film.height));
-    }
-    Ok(())
+    tokio::task::spawn_blocking(move || store.room_for(pixels)).await.map_err(|error| error.to_string())?
 }
 
 async fn watch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(), FrameError> {

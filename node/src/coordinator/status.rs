@@ -11,12 +11,21 @@ use crate::{
 pub type Times = (Duration, f64);
 
 /// The farm's status at the moment `now`.
-pub fn of(farm: &Farm, times: &mut BTreeMap<JobId, Times>, now: Duration) -> Status {
+///
+/// `seen` tells of a job why its files are not written; of jobs that were deleted it knows nothing.
+pub fn of(
+    farm: &Farm,
+    times: &mut BTreeMap<JobId, Times>,
+    now: Duration,
+    refusal: Option<String>,
+    seen: impl Fn(JobId) -> Option<Option<String>>,
+) -> Status {
     let jobs = farm.jobs();
     times.retain(|id, _| jobs.iter().any(|job| job.id == *id));
     Status {
         nodes: farm.nodes().into_iter().map(node).collect(),
-        jobs: jobs.into_iter().map(|snapshot| job(snapshot, times, now)).collect(),
+        jobs: jobs.into_iter().filter_map(|snapshot| Some((seen(snapshot.id)?, snapshot))).map(|it| job(it.1, it.0, times, now)).collect(),
+        refusal,
     }
 }
 
@@ -25,7 +34,7 @@ fn node(node: NodeSnapshot) -> NodeStatus {
     NodeStatus { id, name, lanes, address, build, state, reason, holds: u32::try_from(holds).unwrap_or(u32::MAX) }
 }
 
-fn job(job: JobSnapshot, times: &mut BTreeMap<JobId, Times>, now: Duration) -> JobStatus {
+fn job(job: JobSnapshot, trouble: Option<String>, times: &mut BTreeMap<JobId, Times>, now: Duration) -> JobStatus {
     let count = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
     let left = (job.phase == JobPhase::Rendering).then(|| {
         let (since, before) = *times.entry(job.id).or_insert((now, job.progress));
@@ -41,6 +50,7 @@ fn job(job: JobSnapshot, times: &mut BTreeMap<JobId, Times>, now: Duration) -> J
         progress: job.progress,
         seconds: job.seconds,
         left: left.flatten(),
+        trouble,
     }
 }
 

@@ -36,17 +36,49 @@ pub struct StoredJob {
 #[derive(Clone, Debug)]
 pub struct Store {
     folder: PathBuf,
+    /// Bytes that stay free.
+    reserve: u64,
 }
 
 impl Store {
-    /// Opens the folder, made where it is missing.
+    /// Opens the folder, made where it is missing. Jobs for which fewer than `reserve` bytes would stay free are refused.
     ///
     /// # Errors
     /// When it cannot be made.
-    pub fn open(folder: &Path) -> io::Result<Self> {
+    pub fn open(folder: &Path, reserve: u64) -> io::Result<Self> {
         fs::create_dir_all(folder.join("assets"))?;
         fs::create_dir_all(folder.join("jobs"))?;
-        Ok(Self { folder: folder.to_owned() })
+        Ok(Self { folder: folder.to_owned(), reserve })
+    }
+
+    /// Bytes that are free where the folder is.
+    ///
+    /// # Errors
+    /// When the system does not say.
+    pub fn free(&self) -> io::Result<u64> {
+        let system = rustix::fs::statvfs(&self.folder)?;
+        Ok(system.f_bavail.saturating_mul(system.f_frsize))
+    }
+
+    /// Whether a frame of so many pixels can be stored and written.
+    ///
+    /// # Errors
+    /// In words, when too little would stay free. A disk that does not say how much is free has room.
+    pub fn room_for(&self, pixels: u64) -> Result<(), String> {
+        let free = self.free().unwrap_or(u64::MAX);
+        // Once as parts, once as a picture; a preview and the manifest are small beside them.
+        let needed = pixels.saturating_mul(2 * 12);
+        if free.saturating_sub(needed) >= self.reserve {
+            return Ok(());
+        }
+        let mega = |bytes: u64| bytes.div_ceil(1 << 20);
+        Err(format!(
+            "{} MiB are free on the coordinator's disk, where {} must stay free and a frame takes {}: delete old jobs (`tessera list`, `tessera delete`) or \
+             make room",
+            free >> 20,
+            mega(self.reserve),
+            mega(needed)
+        ))
     }
 
     /// Where an asset lies, if it is here.
@@ -152,7 +184,7 @@ mod tests {
     #[tokio::test]
     async fn only_whole_and_true_assets_are_kept() {
         let folder = tempfile::tempdir().unwrap();
-        let store = Store::open(folder.path()).unwrap();
+        let store = Store::open(folder.path(), 0).unwrap();
         let bytes = vec![7; 3 * READ_CHUNK_BYTES + 5];
         let id = AssetId::of(&bytes);
         let short = store.receive(id, &mut [&9_u64.to_le_bytes()[..], &[7; 8]].concat().as_slice()).await;

@@ -115,6 +115,12 @@ impl Journal {
         Ok(())
     }
 
+    /// Events in it, and their bytes on disk.
+    pub fn size(&self) -> (u64, u64) {
+        let bytes = std::fs::metadata(self.folder.join("events.redb")).map_or(0, |file| file.len());
+        (self.next, bytes)
+    }
+
     /// Begins anew: nothing in the journal is needed any more.
     fn clear(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let writing = self.database.begin_write()?;

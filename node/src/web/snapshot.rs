@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::{
-    farm::{Farm, JobPhase, JobSnapshot, NodeSnapshot, NodeState, Outcome, PartSnapshot},
+    farm::{Farm, JobId, JobPhase, JobSnapshot, NodeSnapshot, NodeState, Outcome, PartSnapshot},
     limits::STATUS_PARTS,
     manifest,
     schedule::NodeId,
@@ -14,6 +14,8 @@ use crate::{
 pub struct Snapshot {
     /// Version and engine revision of the coordinator.
     pub program: String,
+    /// Why no job is taken now, if so.
+    pub refusal: Option<String>,
     /// Every node that is known.
     pub nodes: Vec<NodeStatus>,
     /// Jobs that wait, run, or ended lately, in order of submission.
@@ -52,6 +54,8 @@ pub struct JobStatus {
     pub phase: JobPhase,
     /// How it ended, in words; empty while it has not.
     pub outcome: String,
+    /// Why its files are not written, where the disk refuses them.
+    pub trouble: Option<String>,
     /// Columns of the frame.
     pub width: u32,
     /// Rows of the frame.
@@ -67,19 +71,21 @@ pub struct JobStatus {
 }
 
 impl Snapshot {
-    /// The farm now. `size` tells columns and rows of a job's frame.
-    pub fn of(farm: &Farm, size: impl Fn(u64) -> (u32, u32)) -> Self {
+    /// The farm now. `seen` tells what its core does not know of a job: columns and rows of its frame, and why its files are not written. Jobs of which
+    /// it knows nothing are left out: they were deleted.
+    pub fn of(farm: &Farm, refusal: Option<String>, seen: impl Fn(JobId) -> Option<((u32, u32), Option<String>)>) -> Self {
         let job = |job: JobSnapshot| {
-            let (width, height) = size(job.id.0);
+            let ((width, height), trouble) = seen(job.id)?;
             let parts = if job.parts <= STATUS_PARTS { farm.parts(job.id) } else { Vec::new() };
             let (phase, outcome) = (job.phase, outcome(job.outcome));
             let JobSnapshot { id, name, seconds, parts: total, committed, .. } = job;
-            JobStatus { id: id.0, name, phase, outcome, width, height, seconds, total, committed, parts }
+            Some(JobStatus { id: id.0, name, phase, outcome, trouble, width, height, seconds, total, committed, parts })
         };
         Self {
             program: manifest::program(),
+            refusal,
             nodes: farm.nodes().into_iter().map(NodeStatus::from).collect(),
-            jobs: farm.jobs().into_iter().map(job).collect(),
+            jobs: farm.jobs().into_iter().filter_map(job).collect(),
         }
     }
 }

@@ -16,13 +16,14 @@ use crate::{
     schedule::{NodeId, PartId},
 };
 
-fn snapshot() -> Snapshot {
+pub fn snapshot() -> Snapshot {
     let part = |id: u32, phase, node: Option<u32>| {
         let rect = Rect { x: id * 32, y: 0, width: 32, height: 32 };
         PartSnapshot { id: PartId(id), rect, phase, node: node.map(NodeId) }
     };
     Snapshot {
         program: "tessera 0.1.0".into(),
+        refusal: Some("no space".into()),
         nodes: vec![NodeStatus {
             id: NodeId(3),
             name: "</script><b>attic".into(),
@@ -38,6 +39,7 @@ fn snapshot() -> Snapshot {
             name: "mini_demo".into(),
             phase: JobPhase::Rendering,
             outcome: String::new(),
+            trouble: Some("its folder is gone".into()),
             width: 96,
             height: 32,
             seconds: 3.0,
@@ -63,7 +65,7 @@ async fn the_page_the_status_and_the_health_are_served_until_the_end() {
     let (stop, stopped) = oneshot::channel::<()>();
     let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
     let address = listener.local_addr().unwrap();
-    let server = tokio::spawn(serve(listener, snapshots, async { stopped.await.unwrap_or(()) }));
+    let server = tokio::spawn(serve(listener, snapshots, Arc::default(), async { stopped.await.unwrap_or(()) }));
     say.send_replace(Arc::new(snapshot()));
 
     let (head, page) = get(address, "/").await;
@@ -75,6 +77,13 @@ async fn the_page_the_status_and_the_health_are_served_until_the_end() {
     assert_eq!(serde_json::from_str::<serde_json::Value>(&body).unwrap(), serde_json::to_value(snapshot()).unwrap());
 
     assert_eq!(get(address, "/healthz").await.1, "ok\n");
+    let (head, why) = get(address, "/readyz").await;
+    assert!(head.starts_with("HTTP/1.1 503") && why == "no space\n", "{head}\n{why}");
+    let (head, metrics) = get(address, "/metrics").await;
+    assert!(head.starts_with("HTTP/1.1 200") && head.contains("application/openmetrics-text"), "{head}");
+    assert!(metrics.contains("tessera_refuses_jobs 1\n") && metrics.ends_with("# EOF\n"), "{metrics}");
+    say.send_replace(Arc::new(Snapshot { refusal: None, ..snapshot() }));
+    assert_eq!(get(address, "/readyz").await.1, "ok\n");
     assert!(get(address, "/../etc/passwd").await.0.starts_with("HTTP/1.1 404"));
     drop(say);
     assert!(get(address, "/healthz").await.0.starts_with("HTTP/1.1 503"));

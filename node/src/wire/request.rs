@@ -80,6 +80,8 @@ pub struct Status {
     pub nodes: Vec<NodeStatus>,
     /// All jobs known, oldest first.
     pub jobs: Vec<JobStatus>,
+    /// Why no job is taken now, if so.
+    pub refusal: Option<String>,
 }
 
 /// A node.
@@ -122,6 +124,8 @@ pub struct JobStatus {
     pub seconds: f64,
     /// Seconds until all parts are committed, if the rest goes as what is committed went.
     pub left: Option<f64>,
+    /// Why its files are not written, where the coordinator's disk refuses them.
+    pub trouble: Option<String>,
 }
 
 /// Where a job stands.

@@ -1,0 +1,136 @@
+//! Jobs in the hands of the core's task: they are taken, their files are written, the disk holds them up, they end.
+
+use std::{
+    collections::BTreeMap,
+    sync::Arc,
+    thread,
+    time::{Instant, SystemTime, UNIX_EPOCH},
+};
+
+use tokio::sync::oneshot;
+
+use super::{
+    assemble::{self, Assembly, Refusal},
+    core::Core,
+    input::Input,
+    store::StoredJob,
+    submission,
+};
+use crate::{
+    farm::{Event, JobId, Outcome},
+    job::JobDescription,
+    limits::DISK_RETRY,
+};
+
+/// Clients that wait to hear that their job is taken.
+pub type Unanswered = BTreeMap<JobId, oneshot::Sender<Result<JobId, String>>>;
+
+/// A job as this shell knows it.
+pub struct Known {
+    /// Columns and rows of its frame.
+    pub size: (u32, u32),
+    /// What was submitted, until it is over.
+    pub stored: Option<Arc<StoredJob>>,
+    /// Why its files are not written.
+    pub trouble: Option<String>,
+}
+
+impl Known {
+    /// A job that waits or runs.
+    pub fn new(stored: StoredJob) -> Self {
+        let film = &stored.description.frame.film;
+        Self { size: (film.width, film.height), stored: Some(Arc::new(stored)), trouble: None }
+    }
+}
+
+impl Core {
+    /// Why no job is taken now, if so.
+    pub(super) fn refusal(&self) -> Option<String> {
+        self.disk_trouble.clone().or_else(|| self.no_space.clone())
+    }
+
+    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32) -> Result<JobId, String> {
+        let words = |error: &dyn std::fmt::Display| format!("the job could not be stored: {error}");
+        if let Some(refusal) = self.refusal() {
+            return Err(refusal);
+        }
+        let job = self.shared.store.next_job().map_err(|error| words(&error))?;
+        let frame = postcard::to_stdvec(&description.frame).map_err(|error| words(&error))?;
+        let frame = self.shared.store.put(&frame).map_err(|error| words(&error))?;
+        let submitted = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        let spec = submission::spec(&description, min_nodes);
+        let stored = StoredJob { description, frame, submitted };
+        self.shared.store.put_job(job, &stored).map_err(|error| words(&error))?;
+        tracing::info!(job = job.0, name = stored.description.name, "a job was submitted");
+        self.jobs.insert(job, Known::new(stored));
+        self.step(Event::JobSubmitted { job, spec });
+        self.publish();
+        Ok(job)
+    }
+
+    pub(super) fn answer_when_taken(&mut self, job: JobId, reply: oneshot::Sender<Result<JobId, String>>) {
+        self.unanswered.insert(job, reply);
+        let inputs = self.shared.inputs.clone();
+        self.disk.then(move || drop(inputs.blocking_send(Input::Taken(job))));
+    }
+
+    /// The disk begins or ceases to refuse. Jobs that it has not taken yet are refused: their clients may try again, and need not wait.
+    pub(super) fn disk_refuses(&mut self, trouble: Option<String>) {
+        self.changed = true;
+        self.disk_trouble.clone_from(&trouble);
+        let Some(trouble) = trouble else { return };
+        for (job, reply) in std::mem::take(&mut self.unanswered) {
+            let reason = format!("the coordinator's disk does not take it: {trouble}");
+            self.step(Event::JobCancelled { job, reason: reason.clone() });
+            let _ = reply.send(Err(reason));
+        }
+    }
+
+    /// The disk refuses a job's files. It holds up those behind it, so everyone who looks is told.
+    pub(super) fn held_up(&mut self, job: JobId, reason: String) {
+        let Some(known) = self.jobs.get_mut(&job).filter(|known| known.stored.is_some()) else { return };
+        let trouble = format!("its files cannot be written: {reason}");
+        if known.trouble.as_ref() != Some(&trouble) {
+            tracing::error!(
+                job = job.0,
+                reason,
+                "the job keeps its parts until the disk takes its files, and others wait; `tessera cancel` ends it"
+            );
+            known.trouble = Some(trouble);
+            self.changed = true;
+        }
+    }
+
+    pub(super) fn ended(&mut self, job: JobId, outcome: &Outcome) {
+        if let Some(record) = self.farm.record(job) {
+            self.shared.metrics.ended(outcome, &record);
+        }
+        if let Some(known) = self.jobs.get_mut(&job) {
+            (known.stored, known.trouble) = (None, None);
+        }
+    }
+
+    pub(super) fn assemble(&mut self, job: JobId) {
+        let stored = self.jobs.get(&job).and_then(|known| known.stored.clone());
+        let (Some(stored), Some(record)) = (stored, self.farm.record(job)) else { return };
+        let assembly =
+            Assembly { job, stored, record, parts: self.farm.committed(job), files: self.shared.store.files(job), made: Instant::now() };
+        let (pixels, inputs, metrics) = (self.disk.pixels.clone(), self.shared.inputs.clone(), self.shared.metrics.clone());
+        tokio::task::spawn_blocking(move || {
+            let input = match assemble::write(&assembly, &pixels) {
+                Ok(report) => {
+                    metrics.finished(&report);
+                    Input::Event(Event::Assembled { job, result: Ok(()) })
+                }
+                Err(Refusal::Pixels(reason)) => Input::Event(Event::Assembled { job, result: Err(reason) }),
+                Err(Refusal::Files(reason)) => {
+                    metrics.disk_refusals.inc();
+                    drop(inputs.blocking_send(Input::HeldUp(job, reason)));
+                    thread::sleep(DISK_RETRY);
+                    Input::Assemble(job)
+                }
+            };
+            drop(inputs.blocking_send(input));
+        });
+    }
+}
