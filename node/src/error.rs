@@ -20,6 +20,8 @@ pub enum ExitCode {
     Job = 6,
     /// An output does not agree with what was promised.
     Verify = 7,
+    /// The farm does not accept this identity, or does not let it do that.
+    Denied = 8,
     /// The user interrupted it (128 + SIGINT).
     Interrupted = 130,
 }
@@ -49,6 +51,12 @@ impl Error {
     pub fn with_help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
+    }
+
+    /// Adds a way out where none is known yet.
+    #[must_use]
+    pub fn or_help(self, help: impl Into<String>) -> Self {
+        if self.help.is_some() { self } else { self.with_help(help) }
     }
 }
 

@@ -5,6 +5,7 @@
 
 pub mod limits;
 pub mod error;
+pub mod throttle;
 pub mod files;
 pub mod config;
 pub mod schedule;

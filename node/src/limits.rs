@@ -112,11 +112,54 @@ pub const INPUT_BATCH: usize = 1024;
 /// Messages that wait for one peer; a peer that does not take them is disconnected.
 pub const PEER_QUEUE: usize = 65_536;
 
+// ---- Identities --------------------------------------------------------------------------------------------------------
+
+/// How long a certificate is valid.
+pub const CERTIFICATE_VALIDITY: Duration = Duration::from_hours(365 * 24);
+
+/// How long a farm's authority is valid.
+pub const AUTHORITY_VALIDITY: Duration = Duration::from_hours(3650 * 24);
+
+/// How much earlier than now a certificate begins, for clocks that are behind.
+pub const CERTIFICATE_BACKDATE: Duration = Duration::from_hours(1);
+
+/// How long before its end a certificate is complained about.
+pub const EXPIRY_WARNING: Duration = Duration::from_hours(30 * 24);
+
 /// A name in a certificate.
 pub const NAME_BYTES: usize = 64;
 
 /// A file with a key and certificates.
 pub const KEY_FILE_BYTES: u64 = 64 << 10;
+
+// ---- Peers that mean harm ----------------------------------------------------------------------------------------------
+
+/// Handshakes under way at once; whoever comes beyond that has to try again.
+pub const HANDSHAKES: usize = 256;
+
+/// Connections of all peers.
+pub const CONNECTIONS: usize = 24_000;
+
+/// Connections of one node: the present one, and those that broke and are not given up yet.
+pub const CONNECTIONS_PER_NODE: usize = 4;
+
+/// Connections of one client's key.
+pub const CONNECTIONS_PER_CLIENT: usize = 32;
+
+/// Bytes under way in either direction of a client's connection.
+pub const CLIENT_WINDOW_BYTES: u32 = 8 << 20;
+
+/// Refusals that are logged within [`REFUSAL_LOG_INTERVAL`]; more are counted.
+pub const REFUSALS_LOGGED: u32 = 10;
+
+/// See [`REFUSALS_LOGGED`].
+pub const REFUSAL_LOG_INTERVAL: Duration = Duration::from_secs(10);
+
+/// How long a node keeps quiet about the same trouble.
+pub const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
+
+/// A node that was heard within this time lives: another process with its key is turned away.
+pub const TWIN_SILENCE: Duration = Duration::from_millis(200);
 
 // ---- A job's beginning -------------------------------------------------------------------------------------------------
 

@@ -259,6 +259,11 @@ fn a_node_of_another_farm_is_refused_and_both_say_why() {
     assert_eq!(status["nodes"].as_array().unwrap().len(), 0);
     let (node, coordinator) = (node.kill(), coordinator.kill());
     assert!(node.errors.contains("not connected") && node.errors.contains("certificate"), "{}", node.errors);
+    assert!(
+        node.errors.contains("different farms") && node.errors.contains("tessera keys issue"),
+        "it says how to mend it: {}",
+        node.errors
+    );
     assert!(coordinator.errors.contains("a peer was refused") && coordinator.errors.contains("certificate"), "{}", coordinator.errors);
 }
 

@@ -16,7 +16,7 @@ use crate::{
     farm::JobId,
     job::JobDescription,
     limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
-    wire::{self, FileHeader, JobState, JobStatus, NodeStatus, Request, Response, Status, tls::Identity},
+    wire::{self, FileHeader, JobState, JobStatus, NodeStatus, Refusal, Request, Response, Status, tls::Identity},
 };
 
 /// How subcommands find their coordinator.
@@ -36,7 +36,7 @@ impl Access {
     /// # Errors
     /// As [`Client::connect`], and when the identity cannot be read.
     pub async fn connect(&self) -> Result<Client> {
-        Client::connect(&self.coordinator, &Identity::load(&self.keys, wire::tls::Role::Client)?).await
+        Client::connect(&self.coordinator, &Identity::load_client(&self.keys)?).await
     }
 }
 
@@ -53,14 +53,14 @@ impl Client {
     /// # Errors
     /// When the coordinator cannot be reached, or either side refuses the other's certificate.
     pub async fn connect(address: &str, identity: &Identity) -> Result<Self> {
-        let failed = |error: String| {
-            Error::new(ExitCode::Farm, format!("cannot reach the coordinator at {address}: {error}"))
-                .with_help("check the address, that the coordinator runs, and that the keys are of its farm")
-        };
-        let socket = resolve(address).map_err(failed)?;
+        if let Some(warning) = identity.warning() {
+            eprintln!("warning: {warning}");
+        }
+        let socket = resolve(address).map_err(|error| unreachable(address, Refusal::other(error)))?;
         let endpoint = wire::client(identity, socket)?;
         let connecting = timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket)).await;
-        let connection = connecting.map_err(|_| failed(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())))?.map_err(failed)?;
+        let late = || Err(Refusal::other(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())));
+        let connection = connecting.unwrap_or_else(|_| late()).map_err(|refusal| unreachable(address, refusal))?;
         Ok(Self { endpoint, connection, address: address.to_owned() })
     }
 
@@ -191,16 +191,27 @@ impl Client {
     }
 
     fn lost(&self, error: impl std::fmt::Display) -> Error {
-        let reason = self.connection.close_reason().map_or_else(|| error.to_string(), |reason| reason.to_string());
-        Error::new(ExitCode::Farm, format!("the coordinator at {} is lost: {reason}", self.address))
+        let refusal = self.connection.close_reason().map_or_else(|| Refusal::other(error.to_string()), |reason| wire::explain(&reason));
+        if refusal.denied {
+            return unreachable(&self.address, refusal);
+        }
+        Error::new(ExitCode::Farm, format!("the coordinator at {} is lost: {refusal}", self.address))
     }
 
     fn unexpected(&self, response: &Response) -> Error {
         match response {
             Response::Refused { reason } => Error::new(ExitCode::Farm, format!("the coordinator at {} refuses: {reason}", self.address)),
+            Response::Denied { reason } => Error::new(ExitCode::Denied, format!("the coordinator at {} refuses: {reason}", self.address)),
             _ => Error::new(ExitCode::Farm, format!("the coordinator at {} answers something else", self.address)),
         }
     }
+}
+
+/// No connection, and why.
+fn unreachable(address: &str, refusal: Refusal) -> Error {
+    let (code, what) = if refusal.denied { (ExitCode::Denied, "refused at") } else { (ExitCode::Farm, "cannot reach the coordinator at") };
+    Error::new(code, format!("{what} {address}: {}", refusal.message))
+        .with_help(refusal.help.unwrap_or("check the address, that the coordinator runs, and that the keys are of its farm"))
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Error {

@@ -57,6 +57,9 @@ pub fn run(args: Args) -> Result<()> {
         farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
         free_bytes: file.free_bytes.unwrap_or(FREE_BYTES),
     };
+    if let Some(warning) = options.identity.warning() {
+        tracing::warn!(warning, "renew the coordinator's key");
+    }
     let web = args.web.or(file.web);
     runtime()?.block_on(async {
         let page = match web {

@@ -6,7 +6,8 @@ use clap::Subcommand;
 
 use crate::{
     error::Result,
-    wire::tls::{Authority, Role},
+    manifest::rfc3339,
+    wire::tls::{Authority, Certificate, Identity, Role},
 };
 
 /// Arguments of `tessera keys`.
@@ -18,7 +19,7 @@ pub struct Args {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Make a farm: its authority, and identities of its coordinator and of a first client.
+    /// Make a farm: its authority, and identities of its coordinator and of a first operator.
     Init {
         /// Folder of the keys, made where it is missing. Keep it where only you can read it.
         folder: PathBuf,
@@ -38,6 +39,21 @@ enum Command {
         #[arg(long, short)]
         output: Option<PathBuf>,
     },
+    /// Show what certificates say: role, name, how long they are valid, fingerprint.
+    Show {
+        /// Files made by `tessera keys`.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
+    /// Certify identities anew before, or after, they expire: keys, roles and names stay. Prints until when.
+    Renew {
+        /// Folder of the farm's authority.
+        #[arg(long, env = "TESSERA_KEYS")]
+        keys: PathBuf,
+        /// Files of identities, which are replaced.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
 }
 
 /// Runs `tessera keys`.
@@ -47,11 +63,27 @@ pub fn run(args: Args) -> Result<()> {
             let authority = Authority::new()?;
             println!("{}", authority.save(&folder)?.display());
             println!("{}", authority.issue(Role::Coordinator, "coordinator")?.save(&folder)?.display());
-            println!("{}", authority.issue(Role::Client, "client")?.save(&folder)?.display());
+            println!("{}", authority.issue(Role::Operator, "operator")?.save(&folder)?.display());
         }
         Command::Issue { keys, role, name, output } => {
             let identity = Authority::load(&keys)?.issue(role, &name)?;
             println!("{}", identity.save(output.as_deref().unwrap_or(&keys))?.display());
+        }
+        Command::Show { files } => {
+            for file in files {
+                let Certificate { peer, fingerprint, issued, expires } = Identity::read(&file)?.certificate;
+                println!("{}: {peer}", file.display());
+                println!("  valid from {} until {}", rfc3339(issued), rfc3339(expires));
+                println!("  fingerprint {fingerprint}");
+            }
+        }
+        Command::Renew { keys, files } => {
+            let authority = Authority::load(&keys)?;
+            for file in files {
+                let renewed = authority.renew(&Identity::read(&file)?)?;
+                renewed.replace(&file)?;
+                println!("{}: valid until {}", file.display(), rfc3339(renewed.certificate.expires));
+            }
         }
     }
     Ok(())

@@ -44,7 +44,7 @@ impl LocalFarm {
             free_bytes: 0,
         };
         let coordinator = Coordinator::start(options).await?;
-        let client = authority.issue(Role::Client, "render")?;
+        let client = authority.issue(Role::Operator, "render")?;
         let mut local = Self { coordinator, client, nodes: JoinSet::new(), folder };
         for number in 1..=nodes {
             let name = format!("node-{number}");

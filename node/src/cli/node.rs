@@ -50,6 +50,9 @@ pub fn run(args: Args) -> Result<()> {
         cache: args.cache.or(file.cache),
         cache_bytes: args.cache_bytes.or(file.cache_bytes).unwrap_or(CACHE_BYTES),
     };
+    if let Some(warning) = options.identity.warning() {
+        tracing::warn!(warning, "renew this node's key");
+    }
     if args.with_parent {
         end_with_parent()?;
     }

@@ -25,10 +25,7 @@ use crate::{
     limits::NO_NODE_TIMEOUT,
     manifest,
     report::{self, Style},
-    wire::{
-        JobState,
-        tls::{Identity, Role},
-    },
+    wire::{JobState, tls::Identity},
 };
 
 /// Arguments of `tessera render`.
@@ -84,7 +81,7 @@ pub fn run(args: Args) -> Result<()> {
 
 async fn on_farm(address: &str, keys: Option<&Path>, loaded: &LoadedJob, progress: Progress, output: &Path) -> Result<Vec<PathBuf>> {
     let keys = keys.ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
-    let client = Client::connect(address, &Identity::load(keys, Role::Client)?).await?;
+    let client = Client::connect(address, &Identity::load_client(keys)?).await?;
     let files = follow(&client, loaded, 1, progress, output).await?;
     client.close().await;
     Ok(files)

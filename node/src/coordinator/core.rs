@@ -24,7 +24,7 @@ use super::{
 use crate::{
     error::Result,
     farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId, NodeInfo},
-    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
+    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL, TWIN_SILENCE},
     schedule::NodeId,
     web::Snapshot,
     wire::{FromNode, Hello, PartHeader, Status, ToNode},
@@ -34,6 +34,7 @@ use crate::{
 pub struct Link {
     id: LinkId,
     incarnation: Incarnation,
+    address: String,
     outgoing: mpsc::Sender<Outgoing>,
     /// When it last gave a sign of life, and whether it was suspected or given up since.
     heard: Instant,
@@ -47,6 +48,13 @@ pub struct Arrived {
     bytes: Vec<u8>,
     length: usize,
     at: Instant,
+}
+
+impl Link {
+    /// Whether the process at its other end lives, beyond doubt.
+    fn lives(&self) -> bool {
+        !self.outgoing.is_closed() && self.heard.elapsed() < TWIN_SILENCE
+    }
 }
 
 /// The core and what stands around it.
@@ -223,7 +231,7 @@ impl Core {
                 }
                 self.step(event);
             }
-            Input::Submit { description, min_nodes, reply } => match self.submit(*description, min_nodes) {
+            Input::Submit { description, min_nodes, owner, reply } => match self.submit(*description, min_nodes, &owner) {
                 Ok(job) => self.answer_when_taken(job, reply),
                 Err(reason) => drop(reply.send(Err(reason))),
             },
@@ -261,9 +269,19 @@ impl Core {
         let next = NodeId(u32::try_from(self.ids.len()).unwrap_or(u32::MAX));
         let node = *self.ids.entry(name.clone()).or_insert(next);
         let incarnation = hello.incarnation;
+        if let Some(twin) = self.links.get(&node).filter(|link| link.incarnation != incarnation && link.lives()) {
+            let reason = format!(
+                "another process with the key of {name} is connected, from {}: give each process a key of its own, or end one of them",
+                twin.address
+            );
+            self.shared.metrics.refused_peers.inc();
+            tracing::warn!(node = name, address, reason, "a node is turned away");
+            let _ = outgoing.try_send(Outgoing::Close(reason));
+            return;
+        }
         tracing::info!(node = name, address, lanes = hello.lanes, build = hello.build, "a node joined");
         self.nodes.insert(id, node);
-        let link = Link { id, incarnation, outgoing, heard: Instant::now(), suspected: false, dead: false };
+        let link = Link { id, incarnation, outgoing, address: address.clone(), heard: Instant::now(), suspected: false, dead: false };
         if self.links.insert(node, link).is_some_and(|earlier| earlier.incarnation != incarnation && !earlier.dead) {
             self.shared.metrics.deaths.inc();
         }

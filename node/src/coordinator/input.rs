@@ -64,6 +64,8 @@ pub enum Input {
         description: Box<JobDescription>,
         /// Nodes to wait for.
         min_nodes: u32,
+        /// Who may fetch and cancel it.
+        owner: String,
         /// The job's number, or why it is refused.
         reply: oneshot::Sender<Result<JobId, String>>,
     },

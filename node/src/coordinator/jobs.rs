@@ -49,7 +49,7 @@ impl Core {
         self.disk_trouble.clone().or_else(|| self.no_space.clone())
     }
 
-    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32) -> Result<JobId, String> {
+    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32, owner: &str) -> Result<JobId, String> {
         let words = |error: &dyn std::fmt::Display| format!("the job could not be stored: {error}");
         if let Some(refusal) = self.refusal() {
             return Err(refusal);
@@ -60,8 +60,8 @@ impl Core {
         let submitted = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
         let spec = submission::spec(&description, min_nodes);
         let stored = StoredJob { description, frame, submitted };
-        self.shared.store.put_job(job, &stored).map_err(|error| words(&error))?;
-        tracing::info!(job = job.0, name = stored.description.name, "a job was submitted");
+        self.shared.store.put_job(job, &stored, owner).map_err(|error| words(&error))?;
+        tracing::info!(job = job.0, name = stored.description.name, owner, "a job was submitted");
         self.jobs.insert(job, Known::new(stored));
         self.step(Event::JobSubmitted { job, spec });
         self.publish();

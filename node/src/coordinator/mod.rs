@@ -4,6 +4,7 @@ mod assemble;
 mod canary;
 mod core;
 mod disk;
+mod gate;
 mod housekeeping;
 mod input;
 mod jobs;
@@ -17,23 +18,31 @@ mod submission;
 
 use std::{net::SocketAddr, path::PathBuf, sync::Arc};
 
-use quinn::{Endpoint, Incoming};
-use rustls::pki_types::CertificateDer;
+use quinn::Endpoint;
 use tokio::{
     sync::{mpsc, oneshot, watch},
     task::JoinHandle,
 };
 
 pub use self::assemble::write_pictures;
-use self::{canary::Canary, core::Core, disk::Disk, input::Input, leases::Leases, policy::Thinker, store::Store};
+use self::{
+    canary::Canary,
+    core::Core,
+    disk::Disk,
+    gate::{Gate, Guest},
+    input::Input,
+    leases::Leases,
+    policy::Thinker,
+    store::Store,
+};
 use crate::{
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
     limits::EVENT_QUEUE,
     web::{Metrics, Snapshot},
     wire::{
-        self, CLOSE_ANEW, CLOSE_RESUME, Status,
-        tls::{Identity, Peer, Role, peer},
+        self, CLOSE_RESUME, Status,
+        tls::{Identity, Role},
     },
 };
 
@@ -57,6 +66,7 @@ struct Shared {
     inputs: mpsc::Sender<Input>,
     store: Store,
     leases: Leases,
+    gate: Gate,
     status: watch::Receiver<Arc<Status>>,
     /// What the status page shows; made only while somebody may look.
     page: watch::Sender<Arc<Snapshot>>,
@@ -103,8 +113,15 @@ impl Coordinator {
         let canary = canary.map_err(|error| Error::new(ExitCode::Internal, format!("the canary part cannot be rendered: {error}")))?;
         let (published, status) = watch::channel(Arc::default());
         let page = watch::Sender::new(Arc::default());
-        let shared =
-            Shared { inputs, store, leases: Leases::default(), status: status.clone(), page: page.clone(), metrics: metrics.clone() };
+        let shared = Shared {
+            inputs,
+            store,
+            leases: Leases::default(),
+            gate: Gate::new(metrics.clone()),
+            status: status.clone(),
+            page: page.clone(),
+            metrics: metrics.clone(),
+        };
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
         let keeping = tokio::spawn(housekeeping::keep(shared.clone()));
         let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping];
@@ -126,30 +143,21 @@ impl Coordinator {
 
 async fn accept(endpoint: Endpoint, shared: Shared) {
     while let Some(incoming) = endpoint.accept().await {
-        tokio::spawn(serve(shared.clone(), incoming));
+        let Some((incoming, room)) = shared.gate.room(incoming) else { continue };
+        let shared = shared.clone();
+        tokio::spawn(async move {
+            if let Some(guest) = shared.gate.admit(incoming, room).await {
+                serve(shared, guest).await;
+            }
+        });
     }
 }
 
-/// Lets a peer in, if its certificate is one of this farm: nothing is read before that is known.
-async fn serve(shared: Shared, incoming: Incoming) {
-    let address = incoming.remote_address();
-    let connection = match incoming.await {
-        Ok(connection) => connection,
-        Err(error) => {
-            shared.metrics.refused_peers.inc();
-            return tracing::warn!(%address, %error, "a peer was refused");
-        }
-    };
-    let identity = connection.peer_identity().and_then(|identity| identity.downcast::<Vec<CertificateDer<'static>>>().ok());
-    let peer = identity.as_ref().and_then(|chain| chain.first()).ok_or("no certificate".to_owned()).and_then(peer);
-    match peer {
-        Ok(Peer { role: Role::Node, name }) => session::serve(shared, connection, name, address).await,
-        Ok(Peer { role: Role::Client, name }) => requests::serve(shared, connection, name).await,
-        Ok(Peer { role: Role::Coordinator, .. }) => connection.close(CLOSE_ANEW.into(), b"there is a coordinator already"),
-        Err(error) => {
-            shared.metrics.refused_peers.inc();
-            tracing::warn!(%address, error, "a peer was refused");
-            connection.close(CLOSE_ANEW.into(), error.as_bytes());
-        }
+async fn serve(shared: Shared, guest: Guest) {
+    match guest.peer().role {
+        Role::Node => session::serve(shared, guest).await,
+        Role::Submitter | Role::Observer | Role::Operator => requests::serve(shared, guest).await,
+        // The gate lets none in.
+        Role::Coordinator => {}
     }
 }

@@ -1,33 +1,42 @@
-//! What clients ask for.
+//! What clients ask for, and what their roles let them do.
 
 use std::{io, path::Path};
 
-use quinn::{Connection, RecvStream, SendStream};
+use quinn::{RecvStream, SendStream};
 use tokio::{io::AsyncWriteExt, sync::oneshot};
 
-use super::{Shared, input::Input, submission};
+use super::{Shared, gate::Guest, input::Input, submission};
 use crate::{
     farm::JobId,
     job::JobDescription,
     limits::{REQUEST_BYTES, RESPONSE_BYTES},
-    wire::{self, FileHeader, FrameError, Request, Response},
+    wire::{
+        self, FileHeader, FrameError, Request, Response,
+        tls::{Deed, Peer},
+    },
 };
 
 /// Serves a client until its connection ends.
-pub async fn serve(shared: Shared, connection: Connection, name: String) {
-    while let Ok((send, receive)) = connection.accept_bi().await {
-        let (shared, name) = (shared.clone(), name.clone());
+pub async fn serve(shared: Shared, guest: Guest) {
+    while let Ok((send, receive)) = guest.connection.accept_bi().await {
+        let (shared, client) = (shared.clone(), guest.peer().clone());
         tokio::spawn(async move {
-            if let Err(error) = answer(&shared, &name, send, receive).await {
-                tracing::info!(client = name, %error, "a request was not answered to its end");
+            if let Err(error) = answer(&shared, &client, send, receive).await {
+                tracing::info!(%client, %error, "a request was not answered to its end");
             }
         });
     }
 }
 
-async fn answer(shared: &Shared, name: &str, mut send: SendStream, mut receive: RecvStream) -> Result<(), FrameError> {
-    match wire::read(&mut receive, REQUEST_BYTES).await? {
-        Request::Submit { description, min_nodes } => submit(shared, description, min_nodes, &mut send, &mut receive).await?,
+async fn answer(shared: &Shared, client: &Peer, mut send: SendStream, mut receive: RecvStream) -> Result<(), FrameError> {
+    let request: Request = wire::read(&mut receive, REQUEST_BYTES).await?;
+    if let Err(reason) = permit(shared, client, &request) {
+        tracing::warn!(%client, reason, "a request was refused");
+        say(&mut send, &Response::Denied { reason }).await?;
+        return send.finish().map_err(|error| io::Error::other(error).into());
+    }
+    match request {
+        Request::Submit { description, min_nodes } => submit(shared, client, description, min_nodes, &mut send, &mut receive).await?,
         Request::Status => {
             let status = shared.status.borrow().as_ref().clone();
             say(&mut send, &Response::Status(status)).await?;
@@ -36,7 +45,7 @@ async fn answer(shared: &Shared, name: &str, mut send: SendStream, mut receive: 
         Request::Fetch { job } => fetch(shared, job, &mut send).await?,
         Request::Cancel { job } => {
             let (reply, answer) = oneshot::channel();
-            let cancel = Input::Cancel { job, reason: format!("cancelled by {name}"), reply };
+            let cancel = Input::Cancel { job, reason: format!("cancelled by {client}"), reply };
             let done = shared.ask(cancel, answer).await;
             say(&mut send, &done.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
         }
@@ -45,12 +54,33 @@ async fn answer(shared: &Shared, name: &str, mut send: SendStream, mut receive: 
     Ok(())
 }
 
+/// Whether a client's role lets it ask for this.
+fn permit(shared: &Shared, client: &Peer, request: &Request) -> Result<(), String> {
+    let (deed, job) = match request {
+        Request::Submit { .. } => (Deed::Submit, None),
+        Request::Status | Request::Watch { .. } => (Deed::Look, None),
+        Request::Fetch { job } => (Deed::Fetch, Some(*job)),
+        Request::Cancel { job } => (Deed::Cancel, Some(*job)),
+    };
+    let owner = job.and_then(|job| shared.store.owner(job));
+    if client.role.may(deed, owner.as_ref() == Some(&client.name)) {
+        return Ok(());
+    }
+    match job {
+        Some(job) if client.role.may(deed, true) => {
+            Err(format!("{client} may {deed} of its own alone, and job {} is not: ask who submitted it, or an operator", job.0))
+        }
+        _ => Err(format!("{client} may not {deed}: that takes a key of another role")),
+    }
+}
+
 async fn say(send: &mut SendStream, response: &Response) -> Result<(), FrameError> {
     wire::write(send, response, RESPONSE_BYTES).await
 }
 
 async fn submit(
     shared: &Shared,
+    client: &Peer,
     description: Box<JobDescription>,
     min_nodes: u32,
     send: &mut SendStream,
@@ -67,7 +97,7 @@ async fn submit(
         }
     }
     let (reply, answer) = oneshot::channel();
-    let submitted = shared.ask(Input::Submit { description, min_nodes, reply }, answer).await;
+    let submitted = shared.ask(Input::Submit { description, min_nodes, owner: client.name.clone(), reply }, answer).await;
     say(send, &submitted.map_or_else(|reason| Response::Refused { reason }, |job| Response::Submitted { job })).await
 }
 

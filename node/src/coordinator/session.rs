@@ -1,9 +1,6 @@
 //! One connection of a node, seen from the coordinator.
 
-use std::{
-    net::SocketAddr,
-    sync::atomic::{AtomicU64, Ordering},
-};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use quinn::{Connection, ConnectionError, RecvStream, SendStream};
 use tessera_engine::{
@@ -18,6 +15,7 @@ use tokio::{
 
 use super::{
     Shared,
+    gate::Guest,
     input::{Input, LinkId, Outgoing},
 };
 use crate::{
@@ -28,7 +26,8 @@ use crate::{
 static LINKS: AtomicU64 = AtomicU64::new(0);
 
 /// Serves a node until its connection ends.
-pub async fn serve(shared: Shared, connection: Connection, name: String, address: SocketAddr) {
+pub async fn serve(shared: Shared, guest: Guest) {
+    let (connection, address, name) = (guest.connection.clone(), guest.address, guest.peer().name.clone());
     let link = LINKS.fetch_add(1, Ordering::Relaxed);
     let reason = match timeout(CONNECT_TIMEOUT, hello(&connection)).await {
         Err(_) => "it did not say hello in time".to_owned(),
@@ -41,7 +40,8 @@ pub async fn serve(shared: Shared, connection: Connection, name: String, address
                 return;
             }
             let reason = converse(&shared, &connection, link, send, receive, messages).await;
-            let left = matches!(connection.close_reason(), None | Some(ConnectionError::ApplicationClosed(_)));
+            let left =
+                matches!(connection.close_reason(), None | Some(ConnectionError::ApplicationClosed(_) | ConnectionError::LocallyClosed));
             // Nobody is left to hear it when the coordinator itself ends.
             let _ = shared.inputs.send(Input::Gone(link, left.then(|| reason.clone()))).await;
             reason

@@ -3,6 +3,7 @@
 //! ```text
 //! assets/HEX             an asset, or a frame's description
 //! jobs/NUMBER/job        the job's description
+//! jobs/NUMBER/owner      the name of who submitted it
 //! jobs/NUMBER/files/...  its output files
 //! ```
 
@@ -147,10 +148,16 @@ impl Store {
     ///
     /// # Errors
     /// When the disk refuses.
-    pub fn put_job(&self, job: JobId, stored: &StoredJob) -> io::Result<()> {
+    pub fn put_job(&self, job: JobId, stored: &StoredJob, owner: &str) -> io::Result<()> {
         fs::create_dir_all(self.files(job))?;
         let bytes = postcard::to_stdvec(stored).map_err(io::Error::other)?;
+        write_atomically(&self.job(job).join("owner"), |file| io::Write::write_all(file, owner.as_bytes())).map_err(io::Error::other)?;
         write_atomically(&self.job(job).join("job"), |file| io::Write::write_all(file, &bytes)).map_err(io::Error::other)
+    }
+
+    /// Who submitted a job, if that is known.
+    pub fn owner(&self, job: JobId) -> Option<String> {
+        fs::read_to_string(self.job(job).join("owner")).ok()
     }
 
     /// A job's description.

@@ -14,6 +14,7 @@ use rustls::{RootCertStore, crypto::ring, server::WebPkiClientVerifier};
 
 use super::{
     ALPN, COORDINATOR_NAME,
+    refusal::{Refusal, explain},
     tls::{Identity, random},
 };
 use crate::{
@@ -32,7 +33,7 @@ pub fn server(address: SocketAddr, identity: &Identity) -> Result<Endpoint> {
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(tls)?
         .with_client_cert_verifier(verifier)
-        .with_single_cert(vec![identity.certificate.clone(), identity.authority.clone()], identity.key.clone_key())
+        .with_single_cert(identity.chain.clone(), identity.key.clone_key())
         .map_err(tls)?;
     crypto.alpn_protocols = vec![ALPN.to_vec()];
     let mut config = ServerConfig::with_crypto(Arc::new(QuicServerConfig::try_from(crypto).map_err(tls)?));
@@ -53,7 +54,7 @@ pub fn client(identity: &Identity, to: SocketAddr) -> Result<Endpoint> {
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(tls)?
         .with_root_certificates(roots(identity)?)
-        .with_client_auth_cert(vec![identity.certificate.clone(), identity.authority.clone()], identity.key.clone_key())
+        .with_client_auth_cert(identity.chain.clone(), identity.key.clone_key())
         .map_err(tls)?;
     crypto.alpn_protocols = vec![ALPN.to_vec()];
     let mut config = ClientConfig::new(Arc::new(QuicClientConfig::try_from(crypto).map_err(tls)?));
@@ -68,10 +69,10 @@ pub fn client(identity: &Identity, to: SocketAddr) -> Result<Endpoint> {
 /// Connects to a coordinator.
 ///
 /// # Errors
-/// In words: when it cannot be reached, or either side refuses the other's certificate.
-pub async fn connect(endpoint: &Endpoint, to: SocketAddr) -> Result<Connection, String> {
-    let connecting = endpoint.connect(to, COORDINATOR_NAME).map_err(|error| error.to_string())?;
-    connecting.await.map_err(|error| error.to_string())
+/// When it cannot be reached, or either side refuses the other's certificate.
+pub async fn connect(endpoint: &Endpoint, to: SocketAddr) -> Result<Connection, Refusal> {
+    let connecting = endpoint.connect(to, COORDINATOR_NAME).map_err(|error| Refusal::other(error.to_string()))?;
+    connecting.await.map_err(|error| explain(&error))
 }
 
 fn endpoint(config: EndpointConfig, server: Option<ServerConfig>, socket: std::net::UdpSocket) -> Result<Endpoint> {
@@ -138,7 +139,9 @@ fn transport() -> Arc<TransportConfig> {
 
 fn roots(identity: &Identity) -> Result<Arc<RootCertStore>> {
     let mut roots = RootCertStore::empty();
-    roots.add(identity.authority.clone()).map_err(tls)?;
+    if let Some(authority) = identity.authority() {
+        roots.add(authority.clone()).map_err(tls)?;
+    }
     Ok(Arc::new(roots))
 }
 

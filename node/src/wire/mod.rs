@@ -8,17 +8,19 @@
 //! | node | bidirectional, one an asset | [`NodeStream::Asset`], answered by a length and the bytes |
 //! | node | unidirectional, one a part | [`PartHeader`], then its pixels |
 //! | node | datagrams | [`Heartbeat`] |
-//! | client | bidirectional, one a request | a [`Request`], answered by [`Response`] frames |
+//! | submitter, observer, operator | bidirectional, one a request | a [`Request`], answered by [`Response`] frames |
 
 mod endpoint;
 mod frame;
 mod message;
+mod refusal;
 mod request;
 pub mod tls;
 
 pub use endpoint::{client, connect, server};
 pub use frame::{FrameError, decode, encode, read, read_exactly, write};
 pub use message::{FromNode, Heartbeat, Hello, NodeStream, PartHeader, ToNode};
+pub use refusal::{Refusal, explain, explain_peer, peer_certificate};
 pub use request::{FileHeader, JobState, JobStatus, NodeStatus, Request, Response, Status, is_plain_name};
 
 /// The protocol, as TLS negotiates it: peers that speak another one do not connect. Raise it with any change of a message.
@@ -33,6 +35,9 @@ pub const CLOSE_RESUME: u8 = 0;
 
 /// The code with which a coordinator closes the connection of a node that is to begin anew; the reason stands beside it.
 pub const CLOSE_ANEW: u8 = 1;
+
+/// The code with which a coordinator closes the connection of a peer for whose certificate there is no place here; the reason stands beside it.
+pub const CLOSE_DENIED: u8 = 2;
 
 #[cfg(test)]
 mod tests;

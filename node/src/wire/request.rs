@@ -62,6 +62,11 @@ pub enum Response {
     Files(Vec<FileHeader>),
     /// It was done.
     Done,
+    /// The role of who asks does not let it.
+    Denied {
+        /// Why.
+        reason: String,
+    },
 }
 
 /// A file that follows.

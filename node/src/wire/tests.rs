@@ -7,6 +7,10 @@ use tessera_engine::{
 };
 
 use super::{FrameError, FromNode, Heartbeat, Hello, NodeStream, PartHeader, Request, Response, Status, ToNode, decode, encode, read};
+use super::{
+    Refusal, explain, peer_certificate,
+    tls::{Authority, Identity, Peer, Role},
+};
 use crate::farm::{Incarnation, JobId, LeaseId};
 
 const LIMIT: usize = 1 << 16;
@@ -137,5 +141,48 @@ fn only_plain_names_name_output_files() {
     }
     for bad in ["", ".", "..", ".hidden", "a/b", "/etc/passwd", "..\\x", "a\0"] {
         assert!(!super::is_plain_name(bad), "{bad}");
+    }
+}
+
+/// Lets one identity connect to another: whom the one that listens sees, or what the other is told.
+async fn meet(listens: &Identity, connects: &Identity) -> Result<Peer, Refusal> {
+    let listening = super::server(std::net::SocketAddr::from(([127, 0, 0, 1], 0)), listens).unwrap();
+    let address = listening.local_addr().unwrap();
+    let accepting = listening.clone();
+    let accepted = tokio::spawn(async move { accepting.accept().await.unwrap().await });
+    let endpoint = super::client(connects, address).unwrap();
+    let connection = super::connect(&endpoint, address).await?;
+    match accepted.await.unwrap() {
+        Ok(peer) => Ok(peer_certificate(&peer).unwrap().unwrap().peer),
+        Err(_) => Err(explain(&connection.closed().await)),
+    }
+}
+
+#[tokio::test]
+async fn nobody_passes_for_another() {
+    let (authority, foreign) = (Authority::new().unwrap(), Authority::new().unwrap());
+    let coordinator = authority.issue(Role::Coordinator, "lead").unwrap();
+    for role in [Role::Node, Role::Submitter, Role::Observer, Role::Operator] {
+        let identity = authority.issue(role, "attic").unwrap();
+        assert_eq!(meet(&coordinator, &identity).await.unwrap(), *identity.peer());
+        let refusal = meet(&identity, &identity).await.unwrap_err();
+        assert!(refusal.denied && refusal.message.contains("not that of a coordinator"), "{role} as coordinator: {refusal}");
+        let refusal = meet(&coordinator, &foreign.issue(role, "attic").unwrap()).await.unwrap_err();
+        assert!(refusal.denied && refusal.message.contains("farm"), "{refusal}");
+    }
+    let refusal = meet(&coordinator, &coordinator).await.unwrap_err();
+    assert!(refusal.denied && refusal.message.contains("not that of a client or a node"), "a coordinator as client: {refusal}");
+}
+
+#[tokio::test]
+async fn time_is_up_on_either_side_and_is_said() {
+    let authority = Authority::new().unwrap();
+    let (fresh, zero) = (crate::limits::CERTIFICATE_VALIDITY, std::time::Duration::ZERO);
+    for (server, client) in [(zero, fresh), (fresh, zero)] {
+        let listens = authority.issue_for(Role::Coordinator, "lead", server).unwrap();
+        let connects = authority.issue_for(Role::Node, "attic", client).unwrap();
+        tokio::time::sleep(std::time::Duration::from_secs(2)).await;
+        let refusal = meet(&listens, &connects).await.unwrap_err();
+        assert!(refusal.denied && refusal.message.contains("not valid now"), "{refusal}");
     }
 }

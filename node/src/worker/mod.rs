@@ -12,6 +12,7 @@ mod session;
 use std::{
     net::{SocketAddr, ToSocketAddrs},
     path::PathBuf,
+    time::Instant,
 };
 
 use tokio::{
@@ -28,7 +29,7 @@ use self::{
 use crate::{
     error::{Error, ExitCode, Result},
     farm::Incarnation,
-    limits::CONNECT_TIMEOUT,
+    limits::{COMPLAINT_INTERVAL, CONNECT_TIMEOUT},
     wire::{
         self,
         tls::{self, Identity},
@@ -65,13 +66,23 @@ pub fn run(options: &Options, stop: watch::Receiver<bool>) -> Result<()> {
 async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
     let mut stop = node.stop.clone();
     let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
-    let mut backoff = Backoff::default();
+    let (mut backoff, mut trouble) = (Backoff::default(), Trouble::default());
     loop {
         match join_once(options, node, &mut life, &mut done, &mut backoff).await {
             Ended::Stopped => return Ok(()),
-            Ended::Broken(reason) => tracing::warn!(reason, coordinator = options.coordinator, "not connected"),
+            Ended::Broken(reason) => {
+                if trouble.is_news(&reason) {
+                    tracing::warn!(reason, coordinator = options.coordinator, "not connected; trying again until it works");
+                }
+            }
             Ended::Closed(reason) => {
-                tracing::warn!(reason, coordinator = options.coordinator, "the coordinator closed the connection");
+                if trouble.is_news(&reason) {
+                    tracing::warn!(
+                        reason,
+                        coordinator = options.coordinator,
+                        "the coordinator closed the connection; trying again until it works"
+                    );
+                }
                 (life, done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
             }
         }
@@ -79,6 +90,20 @@ async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
             _ = stop.wait_for(|&stop| stop) => return Ok(()),
             () = sleep(backoff.pause()) => {}
         }
+    }
+}
+
+/// What is wrong, said once, and again only after a while.
+#[derive(Default)]
+struct Trouble(Option<(String, Instant)>);
+
+impl Trouble {
+    fn is_news(&mut self, reason: &str) -> bool {
+        if self.0.as_ref().is_some_and(|(last, since)| last == reason && since.elapsed() < COMPLAINT_INTERVAL) {
+            return false;
+        }
+        self.0 = Some((reason.to_owned(), Instant::now()));
+        true
     }
 }
 
@@ -92,7 +117,7 @@ async fn join_once(
     let connect = async {
         let address = resolve(&options.coordinator).await?;
         let endpoint = wire::client(&options.identity, address).map_err(|error| error.to_string())?;
-        let connection = wire::connect(&endpoint, address).await?;
+        let connection = wire::connect(&endpoint, address).await.map_err(|refusal| refusal.to_string())?;
         Ok::<_, String>((endpoint, connection))
     };
     let mut stop = node.stop.clone();
@@ -105,8 +130,8 @@ async fn join_once(
         Ok(Err(error)) => return Ended::Broken(error),
         Err(_) => return Ended::Broken(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())),
     };
-    tracing::info!(coordinator = options.coordinator, name = options.identity.peer.name, "connected");
-    let connected = std::time::Instant::now();
+    tracing::info!(coordinator = options.coordinator, name = options.identity.peer().name, "connected");
+    let connected = Instant::now();
     let ended = session::run(node, &connection, life, done).await;
     if connected.elapsed() > CONNECT_TIMEOUT {
         *backoff = Backoff::default();

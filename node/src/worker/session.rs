@@ -168,7 +168,7 @@ fn broken(connection: &Connection, error: &str) -> Ended {
         Some(ConnectionError::ApplicationClosed(close)) if close.error_code != wire::CLOSE_RESUME.into() => {
             Ended::Closed(String::from_utf8_lossy(&close.reason).into_owned())
         }
-        Some(reason) => Ended::Broken(reason.to_string()),
+        Some(reason) => Ended::Broken(wire::explain(&reason).to_string()),
         None => {
             connection.close(0_u8.into(), b"");
             Ended::Broken(error.to_owned())
