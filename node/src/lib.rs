@@ -8,6 +8,7 @@ pub mod error;
 pub mod throttle;
 pub mod files;
 pub mod config;
+pub mod supervisor;
 pub mod schedule;
 pub mod manifest;
 pub mod report;

@@ -18,6 +18,9 @@ pub const DEAD_AFTER: Duration = Duration::from_secs(10);
 /// How long a job without any node waits for one before it fails.
 pub const NO_NODE_TIMEOUT: Duration = Duration::from_secs(60);
 
+/// How often the service manager's watchdog is fed within its patience.
+pub const WATCHDOG_FEEDS: u32 = 4;
+
 // ---- Nodes -------------------------------------------------------------------------------------------------------------
 
 /// How far rendering threads stand back behind others, the network's thread first of all.

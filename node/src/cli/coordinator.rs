@@ -5,19 +5,19 @@ use std::{
     path::PathBuf,
 };
 
-use sd_notify::NotifyState;
-use tokio::{net::TcpListener, sync::oneshot, time::interval};
+use tokio::{net::TcpListener, sync::oneshot, time::sleep};
 
 use super::{
     render::seconds,
-    runtime::{interrupted, notify, runtime, start_logs},
+    runtime::{interrupted, runtime, start_logs},
 };
 use crate::{
     config::{Config, PORT, required},
-    coordinator::{Coordinator, Options},
+    coordinator::{Coordinator, Options, Pulse},
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
     limits::{FREE_BYTES, NO_NODE_TIMEOUT},
+    supervisor::{self, Watchdog},
     web,
     wire::tls::{Identity, Role},
 };
@@ -38,6 +38,7 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS")]
     no_node_timeout: Option<f64>,
     /// Address of the status page, plain HTTP for anyone who can reach it: keep it on loopback, or behind a proxy that asks who is there.
+    /// A socket that the service manager hands over goes before it.
     #[arg(long, env = "TESSERA_WEB", value_name = "ADDR:PORT")]
     web: Option<SocketAddr>,
     /// Settings file; flags and environment go before it.
@@ -62,9 +63,10 @@ pub fn run(args: Args) -> Result<()> {
     }
     let web = args.web.or(file.web);
     runtime()?.block_on(async {
-        let page = match web {
-            Some(address) => Some(listen(address).await?),
-            None => None,
+        let page = match (supervisor::listener()?, web) {
+            (Some(listener), _) => Some(TcpListener::from_std(listener).map_err(|error| Error::new(ExitCode::Farm, error.to_string()))?),
+            (None, Some(address)) => Some(listen(address).await?),
+            (None, None) => None,
         };
         let coordinator = Coordinator::start(options).await?;
         println!("listening on {}", coordinator.address);
@@ -75,10 +77,10 @@ pub fn run(args: Args) -> Result<()> {
             }
             tokio::spawn(web::serve(listener, coordinator.page(), coordinator.metrics.clone(), async { drop(stopped.await) }));
         }
-        notify(NotifyState::Ready);
-        let feeding = tokio::spawn(feed_watchdog(coordinator.status.clone()));
+        supervisor::ready();
+        let feeding = tokio::spawn(feed_watchdog(coordinator.pulse()));
         interrupted().await;
-        notify(NotifyState::Stopping);
+        supervisor::stopping();
         feeding.abort();
         drop(stop);
         coordinator.stop().await;
@@ -93,12 +95,12 @@ async fn listen(address: SocketAddr) -> Result<TcpListener> {
     })
 }
 
-/// Tells the service manager that the coordinator lives: as long as its core can be heard.
-async fn feed_watchdog<T>(status: tokio::sync::watch::Receiver<T>) {
-    let Some(patience) = sd_notify::watchdog_enabled() else { return };
-    let mut feed = interval(patience / 3);
-    while status.has_changed().is_ok() {
-        feed.tick().await;
-        notify(NotifyState::Watchdog);
+/// Feeds the watchdog as long as the core answers.
+async fn feed_watchdog(pulse: Pulse) {
+    let watchdog = Watchdog::new();
+    let Some(pause) = watchdog.pause() else { return };
+    while pulse.felt().await {
+        watchdog.feed();
+        sleep(pause).await;
     }
 }

@@ -2,13 +2,12 @@
 
 use std::{io::Read, path::PathBuf, process, thread};
 
-use sd_notify::NotifyState;
-
-use super::runtime::{notify, start_logs, stop_on_signals};
+use super::runtime::{start_logs, stop_on_signals};
 use crate::{
     config::{Config, required},
     error::{Error, ExitCode, Result},
     limits::CACHE_BYTES,
+    supervisor,
     wire::tls::{Identity, Role},
     worker,
 };
@@ -58,7 +57,7 @@ pub fn run(args: Args) -> Result<()> {
     }
     let stop = stop_on_signals()?;
     // Ready does not mean connected: a node outlives its coordinator, and waits for it.
-    notify(NotifyState::Ready);
+    supervisor::ready();
     worker::run(&options, stop)
 }
 

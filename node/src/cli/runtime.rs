@@ -2,7 +2,6 @@
 
 use std::{future::Future, io::IsTerminal, thread, time::Duration};
 
-use sd_notify::NotifyState;
 use tokio::{
     runtime::Runtime,
     signal::unix::{SignalKind, signal},
@@ -73,9 +72,4 @@ pub fn stop_on_signals() -> Result<watch::Receiver<bool>> {
     };
     thread::Builder::new().name("signals".to_owned()).spawn(listen).map_err(internal)?;
     Ok(stopped)
-}
-
-/// Tells the service manager how things stand; without one there is nobody to tell.
-pub fn notify(state: NotifyState<'_>) {
-    let _ = sd_notify::notify(&[state]);
 }

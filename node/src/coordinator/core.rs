@@ -222,6 +222,7 @@ impl Core {
                     self.assemble(job);
                 }
             }
+            Input::Ping(reply) => drop(reply.send(())),
             Input::Event(event) => {
                 if let Event::Committed { job, lease } = event {
                     if let Some(arrived) = self.pixels.get(&(job, lease)) {

@@ -56,6 +56,8 @@ pub enum Input {
     Disk(Option<String>),
     /// That the disk is too full for more jobs, or that it has room again.
     Space(Option<String>),
+    /// Somebody wants to know whether the core still takes inputs.
+    Ping(oneshot::Sender<()>),
     /// The rest of the program has an event for the core.
     Event(Event),
     /// A client hands in a job whose assets are all here.

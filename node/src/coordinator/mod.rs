@@ -82,6 +82,20 @@ impl Shared {
     }
 }
 
+/// Tells whether a coordinator's core still works.
+#[derive(Clone)]
+pub struct Pulse {
+    inputs: mpsc::Sender<Input>,
+}
+
+impl Pulse {
+    /// Waits until the core has taken all that came before and answers; false once it has ended.
+    pub async fn felt(&self) -> bool {
+        let (reply, answer) = oneshot::channel();
+        self.inputs.send(Input::Ping(reply)).await.is_ok() && answer.await.is_ok()
+    }
+}
+
 /// A running coordinator.
 pub struct Coordinator {
     /// Where it listens.
@@ -91,6 +105,7 @@ pub struct Coordinator {
     /// What is counted and timed.
     pub metrics: Arc<Metrics>,
     page: watch::Sender<Arc<Snapshot>>,
+    pulse: Pulse,
     endpoint: Endpoint,
     tasks: [JoinHandle<()>; 3],
 }
@@ -113,6 +128,7 @@ impl Coordinator {
         let canary = canary.map_err(|error| Error::new(ExitCode::Internal, format!("the canary part cannot be rendered: {error}")))?;
         let (published, status) = watch::channel(Arc::default());
         let page = watch::Sender::new(Arc::default());
+        let pulse = Pulse { inputs: inputs.clone() };
         let shared = Shared {
             inputs,
             store,
@@ -125,12 +141,17 @@ impl Coordinator {
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
         let keeping = tokio::spawn(housekeeping::keep(shared.clone()));
         let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping];
-        Ok(Self { address, status, metrics, page, endpoint, tasks })
+        Ok(Self { address, status, metrics, page, pulse, endpoint, tasks })
     }
 
     /// What the status page shows. From now on it is made.
     pub fn page(&self) -> watch::Receiver<Arc<Snapshot>> {
         self.page.subscribe()
+    }
+
+    /// Its core's pulse.
+    pub fn pulse(&self) -> Pulse {
+        self.pulse.clone()
     }
 
     /// Ends: connections are closed so that nodes keep what they hold and look for the coordinator again.

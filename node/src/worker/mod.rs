@@ -30,6 +30,7 @@ use crate::{
     error::{Error, ExitCode, Result},
     farm::Incarnation,
     limits::{COMPLAINT_INTERVAL, CONNECT_TIMEOUT},
+    supervisor::Watchdog,
     wire::{
         self,
         tls::{self, Identity},
@@ -58,7 +59,8 @@ pub fn run(options: &Options, stop: watch::Receiver<bool>) -> Result<()> {
     let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
     let cache = Cache::new(options.cache.as_deref(), options.cache_bytes)
         .map_err(|error| Error::new(ExitCode::File, format!("the cache {:?}: {error}", options.cache)))?;
-    let node = Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, stop };
+    let node =
+        Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, stop, watchdog: Watchdog::new() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
     runtime.block_on(join_for_ever(options, &node))
 }
@@ -68,6 +70,7 @@ async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
     let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
     let (mut backoff, mut trouble) = (Backoff::default(), Trouble::default());
     loop {
+        node.watchdog.feed();
         match join_once(options, node, &mut life, &mut done, &mut backoff).await {
             Ended::Stopped => return Ok(()),
             Ended::Broken(reason) => {

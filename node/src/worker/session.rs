@@ -16,6 +16,7 @@ use super::{
 };
 use crate::{
     limits::{CONTROL_BYTES, COORDINATOR_SILENCE, FAREWELL, HEARTBEAT_INTERVAL, HELLO_BYTES, PART_HEADER_BYTES, PEER_QUEUE},
+    supervisor::Watchdog,
     wire::{self, FromNode, Heartbeat, Hello, NodeStream, ToNode},
 };
 
@@ -39,6 +40,8 @@ pub struct Node {
     pub cache: Cache,
     /// Turns true when the node is to end.
     pub stop: watch::Receiver<bool>,
+    /// Fed with every heartbeat and every attempt to connect.
+    pub watchdog: Watchdog,
 }
 
 /// Works over one connection until it ends.
@@ -57,6 +60,7 @@ pub async fn run(node: &Node, connection: &Connection, life: &mut Life, done: &m
             biased;
             _ = stop.wait_for(|&stop| stop) => return farewell(connection, say).await,
             _ = beat.tick() => {
+                node.watchdog.feed();
                 if let Err(error) = pulse.beat(connection, life) {
                     return broken(connection, &error);
                 }
