@@ -6,6 +6,8 @@
 //! data = "/var/lib/tessera"
 //! keys = "/etc/tessera/coordinator-coordinator.pem"
 //! web = "127.0.0.1:7180"          # the status page
+//! issuer = "/etc/tessera/issuer.pem"   # certifies those who join
+//! revoked = "/etc/tessera/revoked"     # list of revoked certificates
 //! no_node_timeout = 60.0          # seconds
 //! free_bytes = 1073741824         # stay free on the disk: jobs that would need them are refused
 //!
@@ -49,6 +51,10 @@ pub struct CoordinatorConfig {
     pub data: Option<PathBuf>,
     /// Its identity: a file, or a folder that holds one.
     pub keys: Option<PathBuf>,
+    /// Certifies those who join: a file, or a folder that holds one.
+    pub issuer: Option<PathBuf>,
+    /// The list of revoked certificates.
+    pub revoked: Option<PathBuf>,
     /// Where the status page is served.
     pub web: Option<SocketAddr>,
     /// Seconds that a job waits for any node.

@@ -129,6 +129,30 @@ pub const CERTIFICATE_BACKDATE: Duration = Duration::from_hours(1);
 /// How long before its end a certificate is complained about.
 pub const EXPIRY_WARNING: Duration = Duration::from_hours(30 * 24);
 
+/// How often the coordinator looks whether its list of revoked certificates has changed.
+pub const REVOCATION_INTERVAL: Duration = Duration::from_secs(1);
+
+/// A list of revoked certificates.
+pub const REVOCATION_BYTES: u64 = 4 << 20;
+
+/// How long a join token is good for, if it is not told otherwise.
+pub const TOKEN_VALIDITY: Duration = Duration::from_hours(1);
+
+/// A file with a join token.
+pub const TOKEN_BYTES: u64 = 4 << 10;
+
+/// A request to join, or its answer.
+pub const JOIN_BYTES: usize = 16 << 10;
+
+/// How long a request to join may take.
+pub const JOIN_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Those who join at once; more have to try again.
+pub const JOINERS: usize = 16;
+
+/// Names and tokens that the coordinator keeps in mind.
+pub const REGISTER: usize = 50_000;
+
 /// A name in a certificate.
 pub const NAME_BYTES: usize = 64;
 
@@ -148,6 +172,9 @@ pub const CONNECTIONS_PER_NODE: usize = 4;
 
 /// Connections of one client's key.
 pub const CONNECTIONS_PER_CLIENT: usize = 32;
+
+/// Bytes that a peer may send before it is known who it is.
+pub const FIRST_WINDOW_BYTES: u32 = 256 << 10;
 
 /// Bytes under way in either direction of a client's connection.
 pub const CLIENT_WINDOW_BYTES: u32 = 8 << 20;

@@ -208,7 +208,7 @@ impl Client {
 }
 
 /// No connection, and why.
-fn unreachable(address: &str, refusal: Refusal) -> Error {
+pub fn unreachable(address: &str, refusal: Refusal) -> Error {
     let (code, what) = if refusal.denied { (ExitCode::Denied, "refused at") } else { (ExitCode::Farm, "cannot reach the coordinator at") };
     Error::new(code, format!("{what} {address}: {}", refusal.message))
         .with_help(refusal.help.unwrap_or("check the address, that the coordinator runs, and that the keys are of its farm"))
@@ -223,7 +223,11 @@ fn plain_permissions() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)
 }
 
-fn resolve(address: &str) -> Result<SocketAddr, String> {
+/// The address of a host and port.
+///
+/// # Errors
+/// In words, when it has none.
+pub fn resolve(address: &str) -> Result<SocketAddr, String> {
     let mut found = address.to_socket_addrs().map_err(|error| match error.kind() {
         std::io::ErrorKind::InvalidInput => "it is not HOST:PORT, such as lead:7143".to_owned(),
         _ => error.to_string(),

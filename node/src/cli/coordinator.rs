@@ -19,7 +19,7 @@ use crate::{
     limits::{FREE_BYTES, NO_NODE_TIMEOUT},
     supervisor::{self, Watchdog},
     web,
-    wire::tls::{Identity, Role},
+    wire::tls::{Authority, Identity, Role},
 };
 
 /// Arguments of `tessera coordinator`.
@@ -34,6 +34,12 @@ pub struct Args {
     /// The coordinator's identity: a file made by `tessera keys`, or a folder that holds one.
     #[arg(long, env = "TESSERA_KEYS", value_name = "PATH")]
     keys: Option<PathBuf>,
+    /// Key with which those are certified who join with a token: a file made by `tessera keys issuer` [default: none, and nobody can join].
+    #[arg(long, env = "TESSERA_ISSUER", value_name = "PATH")]
+    issuer: Option<PathBuf>,
+    /// List of revoked certificates, read again when it changes [default: `revoked` in the folder of --data].
+    #[arg(long, env = "TESSERA_REVOKED", value_name = "FILE")]
+    revoked: Option<PathBuf>,
     /// Seconds that a job waits for any node before it fails [default: 60].
     #[arg(long, value_name = "SECONDS")]
     no_node_timeout: Option<f64>,
@@ -55,6 +61,8 @@ pub fn run(args: Args) -> Result<()> {
         listen: args.listen.or(file.listen).unwrap_or_else(|| SocketAddr::from((Ipv4Addr::UNSPECIFIED, PORT))),
         data: required(args.data.or(file.data), "--data", "coordinator.data")?,
         identity: Identity::load(&required(args.keys.or(file.keys), "--keys", "coordinator.keys")?, Role::Coordinator)?,
+        issuer: args.issuer.or(file.issuer).map(|path| Authority::load_issuer(&path)).transpose()?,
+        revoked: args.revoked.or(file.revoked),
         farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
         free_bytes: file.free_bytes.unwrap_or(FREE_BYTES),
     };

@@ -40,6 +40,8 @@ impl LocalFarm {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
             data: folder.path().join("data"),
             identity: authority.issue(Role::Coordinator, "coordinator")?,
+            issuer: None,
+            revoked: None,
             farm,
             free_bytes: 0,
         };

@@ -11,6 +11,7 @@ mod coordinator;
 mod direct;
 mod fetch;
 mod here;
+mod join;
 mod keys;
 mod local;
 mod node;

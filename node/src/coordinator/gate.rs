@@ -7,22 +7,22 @@ use std::{
     time::{Instant, SystemTime},
 };
 
-use quinn::{Connection, Incoming};
+use quinn::{Connection, Incoming, crypto::rustls::HandshakeData};
 use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::timeout,
+    sync::{OwnedSemaphorePermit, Semaphore, watch},
+    time::{sleep, timeout},
 };
 
 use crate::{
     limits::{
-        CLIENT_WINDOW_BYTES, CONNECT_TIMEOUT, CONNECTIONS, CONNECTIONS_PER_CLIENT, CONNECTIONS_PER_NODE, HANDSHAKES, REFUSAL_LOG_INTERVAL,
-        REFUSALS_LOGGED,
+        CLIENT_WINDOW_BYTES, CONNECT_TIMEOUT, CONNECTIONS, CONNECTIONS_PER_CLIENT, CONNECTIONS_PER_NODE, HANDSHAKES, RECEIVE_WINDOW_BYTES,
+        REFUSAL_LOG_INTERVAL, REFUSALS_LOGGED,
     },
     throttle::Throttle,
     web::Metrics,
     wire::{
-        CLOSE_DENIED, explain_peer, peer_certificate,
-        tls::{Certificate, Peer, Role},
+        CLOSE_DENIED, JOIN_ALPN, explain_peer, peer_certificate,
+        tls::{Certificate, Peer, Revocations, Role},
     },
 };
 
@@ -33,6 +33,25 @@ pub struct Gate {
     inside: Arc<Mutex<Inside>>,
     refusals: Arc<Throttle>,
     metrics: Arc<Metrics>,
+    revoked: watch::Receiver<Arc<Revocations>>,
+}
+
+/// Who got through.
+pub enum Admitted {
+    /// A peer with a certificate.
+    Guest(Guest),
+    /// Someone who wants a key certified.
+    Joiner(Joiner),
+}
+
+/// Someone who wants a key certified, and may say nothing else.
+pub struct Joiner {
+    /// The way to it.
+    pub connection: Connection,
+    /// Where it is.
+    pub address: SocketAddr,
+    /// What it proved, if anything.
+    pub certificate: Option<Certificate>,
 }
 
 /// Connections of those who were let in.
@@ -51,12 +70,31 @@ pub struct Guest {
     /// What it proved.
     pub certificate: Certificate,
     inside: Arc<Mutex<Inside>>,
+    revoked: watch::Receiver<Arc<Revocations>>,
 }
 
 impl Guest {
     /// Who it is.
     pub fn peer(&self) -> &Peer {
         &self.certificate.peer
+    }
+
+    /// Waits until it is no longer welcome, closes its connection, and says why.
+    pub async fn turned_away(&self) -> String {
+        let mut revoked = self.revoked.clone();
+        let reason = loop {
+            if let Some(reason) = revoked.borrow_and_update().refuse(&self.certificate) {
+                break reason;
+            }
+            let left = self.certificate.expires.duration_since(SystemTime::now()).unwrap_or_default();
+            tokio::select! {
+                changed = revoked.changed() => if changed.is_err() { std::future::pending::<()>().await },
+                () = sleep(left) => break format!("the certificate of {} expired", self.peer()),
+            }
+        };
+        tracing::warn!(peer = %self.peer(), address = %self.address, reason, "a peer is sent away");
+        self.connection.close(CLOSE_DENIED.into(), reason.as_bytes());
+        reason
     }
 }
 
@@ -72,13 +110,14 @@ impl Drop for Guest {
 }
 
 impl Gate {
-    /// A gate that nobody has passed yet.
-    pub fn new(metrics: Arc<Metrics>) -> Self {
+    /// A gate that nobody has passed yet, closed to whom this list names.
+    pub fn new(metrics: Arc<Metrics>, revoked: watch::Receiver<Arc<Revocations>>) -> Self {
         Self {
             handshakes: Arc::new(Semaphore::new(HANDSHAKES)),
             inside: Arc::default(),
             refusals: Arc::new(Throttle::new(REFUSALS_LOGGED, REFUSAL_LOG_INTERVAL)),
             metrics,
+            revoked,
         }
     }
 
@@ -94,8 +133,13 @@ impl Gate {
         }
     }
 
+    /// What the list of revoked certificates says now.
+    pub fn revoked(&self) -> Arc<Revocations> {
+        self.revoked.borrow().clone()
+    }
+
     /// Lets a peer in, if its certificate is one of this farm and there is room for it.
-    pub async fn admit(&self, incoming: Incoming, room: OwnedSemaphorePermit) -> Option<Guest> {
+    pub async fn admit(&self, incoming: Incoming, room: OwnedSemaphorePermit) -> Option<Admitted> {
         let address = incoming.remote_address();
         let connection = match timeout(CONNECT_TIMEOUT, incoming).await {
             Ok(Ok(connection)) => connection,
@@ -103,9 +147,13 @@ impl Gate {
             Err(_) => return self.refused(address, "its handshake took too long"),
         };
         drop(room);
-        let certificate = peer_certificate(&connection).unwrap_or_else(|| Err("it has no certificate".to_owned()));
-        match certificate.and_then(|certificate| self.enter(&connection, address, certificate)) {
-            Ok(guest) => Some(guest),
+        let admitted = match peer_certificate(&connection) {
+            None if joins(&connection) => Ok(Admitted::Joiner(Joiner { connection: connection.clone(), address, certificate: None })),
+            None => Err("it has no certificate".to_owned()),
+            Some(certificate) => certificate.and_then(|certificate| self.enter(&connection, address, certificate)),
+        };
+        match admitted {
+            Ok(admitted) => Some(admitted),
             Err(reason) => {
                 connection.close(CLOSE_DENIED.into(), reason.as_bytes());
                 self.refused(address, &reason)
@@ -113,12 +161,21 @@ impl Gate {
         }
     }
 
-    fn enter(&self, connection: &Connection, address: SocketAddr, certificate: Certificate) -> Result<Guest, String> {
+    fn enter(&self, connection: &Connection, address: SocketAddr, certificate: Certificate) -> Result<Admitted, String> {
         let soon = certificate.check_time(SystemTime::now())?;
+        if let Some(reason) = self.revoked().refuse(&certificate) {
+            return Err(reason);
+        }
+        if joins(connection) {
+            return Ok(Admitted::Joiner(Joiner { connection: connection.clone(), address, certificate: Some(certificate) }));
+        }
         let peer = certificate.peer.clone();
         let allowed = match peer.role {
             Role::Coordinator => return Err("a coordinator cannot connect to a coordinator".to_owned()),
-            Role::Node => CONNECTIONS_PER_NODE,
+            Role::Node => {
+                connection.set_receive_window(RECEIVE_WINDOW_BYTES.into());
+                CONNECTIONS_PER_NODE
+            }
             Role::Submitter | Role::Observer | Role::Operator => {
                 connection.set_receive_window(CLIENT_WINDOW_BYTES.into());
                 connection.set_send_window(CLIENT_WINDOW_BYTES.into());
@@ -138,7 +195,8 @@ impl Gate {
         if let Some(warning) = soon.filter(|_| self.refusals.pass(Instant::now()).is_some()) {
             tracing::warn!(%address, warning, "renew it: tessera keys renew");
         }
-        Ok(Guest { connection: connection.clone(), address, certificate, inside: self.inside.clone() })
+        let (inside, revoked) = (self.inside.clone(), self.revoked.clone());
+        Ok(Admitted::Guest(Guest { connection: connection.clone(), address, certificate, inside, revoked }))
     }
 
     /// Notes a refusal: a flood of them must not drown what else is to be said.
@@ -151,4 +209,10 @@ impl Gate {
         }
         None
     }
+}
+
+/// Whether a peer speaks the protocol of those who want a key certified.
+fn joins(connection: &Connection) -> bool {
+    let data = connection.handshake_data().and_then(|data| data.downcast::<HandshakeData>().ok());
+    data.and_then(|data| data.protocol).is_some_and(|protocol| protocol == JOIN_ALPN)
 }

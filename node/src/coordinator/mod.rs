@@ -8,9 +8,12 @@ mod gate;
 mod housekeeping;
 mod input;
 mod jobs;
+mod join;
 mod leases;
 mod policy;
+mod register;
 mod requests;
+mod revoked;
 mod session;
 mod status;
 mod store;
@@ -29,10 +32,12 @@ use self::{
     canary::Canary,
     core::Core,
     disk::Disk,
-    gate::{Gate, Guest},
+    gate::{Admitted, Gate, Guest},
     input::Input,
+    join::Joining,
     leases::Leases,
     policy::Thinker,
+    register::Register,
     store::Store,
 };
 use crate::{
@@ -42,7 +47,7 @@ use crate::{
     web::{Metrics, Snapshot},
     wire::{
         self, CLOSE_RESUME, Status,
-        tls::{Identity, Role},
+        tls::{Authority, Identity, Role},
     },
 };
 
@@ -54,6 +59,10 @@ pub struct Options {
     pub data: PathBuf,
     /// Proves that it is the coordinator.
     pub identity: Identity,
+    /// Certifies those who join; nobody joins without.
+    pub issuer: Option<Authority>,
+    /// The list of revoked certificates; `None` takes `revoked` in its folder.
+    pub revoked: Option<PathBuf>,
     /// Timeouts.
     pub farm: FarmConfig,
     /// Bytes that stay free on its disk.
@@ -67,6 +76,7 @@ struct Shared {
     store: Store,
     leases: Leases,
     gate: Gate,
+    joining: Joining,
     status: watch::Receiver<Arc<Status>>,
     /// What the status page shows; made only while somebody may look.
     page: watch::Sender<Arc<Snapshot>>,
@@ -107,7 +117,7 @@ pub struct Coordinator {
     page: watch::Sender<Arc<Snapshot>>,
     pulse: Pulse,
     endpoint: Endpoint,
-    tasks: [JoinHandle<()>; 3],
+    tasks: [JoinHandle<()>; 4],
 }
 
 impl Coordinator {
@@ -117,9 +127,12 @@ impl Coordinator {
     /// When the address is taken, or the folder cannot be used.
     pub async fn start(options: Options) -> Result<Self> {
         let folder = |error: std::io::Error| Error::new(ExitCode::File, format!("{}: {error}", options.data.display()));
-        let endpoint = wire::server(options.listen, &options.identity)?;
+        let endpoint = wire::server(options.listen, &options.identity, options.issuer.is_some())?;
         let address = endpoint.local_addr().map_err(|error| Error::new(ExitCode::Farm, error.to_string()))?;
         let store = Store::open(&options.data, options.free_bytes).map_err(folder)?;
+        let revoked = options.revoked.unwrap_or_else(|| options.data.join("revoked"));
+        let revocations = revoked::open(&revoked)?;
+        let joining = Joining::new(options.issuer, Register::open(&options.data)?);
         let (inputs, received) = mpsc::channel(EVENT_QUEUE);
         let metrics = Arc::new(Metrics::default());
         let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone(), metrics.clone())?;
@@ -133,14 +146,16 @@ impl Coordinator {
             inputs,
             store,
             leases: Leases::default(),
-            gate: Gate::new(metrics.clone()),
+            gate: Gate::new(metrics.clone(), revocations.subscribe()),
+            joining,
             status: status.clone(),
             page: page.clone(),
             metrics: metrics.clone(),
         };
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
         let keeping = tokio::spawn(housekeeping::keep(shared.clone()));
-        let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping];
+        let following = tokio::spawn(revoked::follow(revoked, revocations));
+        let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping, following];
         Ok(Self { address, status, metrics, page, pulse, endpoint, tasks })
     }
 
@@ -167,14 +182,18 @@ async fn accept(endpoint: Endpoint, shared: Shared) {
         let Some((incoming, room)) = shared.gate.room(incoming) else { continue };
         let shared = shared.clone();
         tokio::spawn(async move {
-            if let Some(guest) = shared.gate.admit(incoming, room).await {
-                serve(shared, guest).await;
+            match shared.gate.admit(incoming, room).await {
+                Some(Admitted::Guest(guest)) => serve(shared, guest).await,
+                Some(Admitted::Joiner(joiner)) => shared.joining.serve(joiner, shared.gate.revoked()).await,
+                None => {}
             }
         });
     }
 }
 
 async fn serve(shared: Shared, guest: Guest) {
+    let (register, peer) = (shared.joining.register.clone(), guest.peer().clone());
+    drop(tokio::task::spawn_blocking(move || register.see(&peer)));
     match guest.peer().role {
         Role::Node => session::serve(shared, guest).await,
         Role::Submitter | Role::Observer | Role::Operator => requests::serve(shared, guest).await,

@@ -18,7 +18,14 @@ use crate::{
 
 /// Serves a client until its connection ends.
 pub async fn serve(shared: Shared, guest: Guest) {
-    while let Ok((send, receive)) = guest.connection.accept_bi().await {
+    loop {
+        let (send, receive) = tokio::select! {
+            accepted = guest.connection.accept_bi() => match accepted {
+                Ok(streams) => streams,
+                Err(_) => return,
+            },
+            _ = guest.turned_away() => return,
+        };
         let (shared, client) = (shared.clone(), guest.peer().clone());
         tokio::spawn(async move {
             if let Err(error) = answer(&shared, &client, send, receive).await {

@@ -39,7 +39,7 @@ pub async fn serve(shared: Shared, guest: Guest) {
             if shared.inputs.send(joined).await.is_err() || taken.await.is_err() {
                 return;
             }
-            let reason = converse(&shared, &connection, link, send, receive, messages).await;
+            let reason = converse(&shared, &guest, link, send, receive, messages).await;
             let left =
                 matches!(connection.close_reason(), None | Some(ConnectionError::ApplicationClosed(_) | ConnectionError::LocallyClosed));
             // Nobody is left to hear it when the coordinator itself ends.
@@ -63,13 +63,15 @@ async fn hello(connection: &Connection) -> Result<(Hello, SendStream, RecvStream
 /// Everything on the connection at once; the first thing that ends ends it all, and says why.
 async fn converse(
     shared: &Shared,
-    connection: &Connection,
+    guest: &Guest,
     link: LinkId,
     send: SendStream,
     receive: RecvStream,
     messages: mpsc::Receiver<Outgoing>,
 ) -> String {
+    let connection = &guest.connection;
     tokio::select! {
+        reason = guest.turned_away() => reason,
         reason = say(send, messages) => reason,
         reason = listen(shared, link, receive) => reason,
         reason = hear_heartbeats(shared, link, connection) => reason,

@@ -19,25 +19,29 @@ use super::{
 };
 use crate::{
     error::{Error, ExitCode, Result},
-    limits::{IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
+    limits::{FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
 };
 
-/// An endpoint that listens. Whoever has no certificate of the same farm is refused in the handshake.
+/// The protocol of those who have a key certified, see [`super::JoinRequest`].
+pub const JOIN_ALPN: &[u8] = b"tessera-join/1";
+
+/// An endpoint that listens. Whoever has a certificate of another farm is refused in the handshake; so is who has none, unless `strangers` are let
+/// in to join. Until the gate opens it, little room is made for what a peer sends.
 ///
 /// # Errors
 /// When the address is taken or not ours.
-pub fn server(address: SocketAddr, identity: &Identity) -> Result<Endpoint> {
-    let verifier =
-        WebPkiClientVerifier::builder_with_provider(roots(identity)?, Arc::new(ring::default_provider())).build().map_err(tls)?;
+pub fn server(address: SocketAddr, identity: &Identity, strangers: bool) -> Result<Endpoint> {
+    let verifier = WebPkiClientVerifier::builder_with_provider(roots(identity)?, Arc::new(ring::default_provider()));
+    let verifier = if strangers { verifier.allow_unauthenticated() } else { verifier }.build().map_err(tls)?;
     let mut crypto = rustls::ServerConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(tls)?
         .with_client_cert_verifier(verifier)
         .with_single_cert(identity.chain.clone(), identity.key.clone_key())
         .map_err(tls)?;
-    crypto.alpn_protocols = vec![ALPN.to_vec()];
+    crypto.alpn_protocols = vec![ALPN.to_vec(), JOIN_ALPN.to_vec()];
     let mut config = ServerConfig::with_crypto(Arc::new(QuicServerConfig::try_from(crypto).map_err(tls)?));
-    config.transport_config(transport());
+    config.transport_config(transport(FIRST_WINDOW_BYTES));
     let socket = std::net::UdpSocket::bind(address).map_err(|error| {
         Error::new(ExitCode::Farm, format!("cannot listen on {address}: {error}"))
             .with_help("another program has this port: end it, or choose another one with --listen")
@@ -50,15 +54,30 @@ pub fn server(address: SocketAddr, identity: &Identity) -> Result<Endpoint> {
 /// # Errors
 /// When the machine gives no socket.
 pub fn client(identity: &Identity, to: SocketAddr) -> Result<Endpoint> {
-    let mut crypto = rustls::ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
+    client_endpoint(with_identity(identity)?, ALPN, to)
+}
+
+/// The same, to have that identity renewed.
+///
+/// # Errors
+/// When the machine gives no socket.
+pub fn renewer(identity: &Identity, to: SocketAddr) -> Result<Endpoint> {
+    client_endpoint(with_identity(identity)?, JOIN_ALPN, to)
+}
+
+fn with_identity(identity: &Identity) -> Result<rustls::ClientConfig> {
+    rustls::ClientConfig::builder_with_provider(Arc::new(ring::default_provider()))
         .with_protocol_versions(&[&rustls::version::TLS13])
         .map_err(tls)?
         .with_root_certificates(roots(identity)?)
         .with_client_auth_cert(identity.chain.clone(), identity.key.clone_key())
-        .map_err(tls)?;
-    crypto.alpn_protocols = vec![ALPN.to_vec()];
+        .map_err(tls)
+}
+
+pub(super) fn client_endpoint(mut crypto: rustls::ClientConfig, alpn: &[u8], to: SocketAddr) -> Result<Endpoint> {
+    crypto.alpn_protocols = vec![alpn.to_vec()];
     let mut config = ClientConfig::new(Arc::new(QuicClientConfig::try_from(crypto).map_err(tls)?));
-    config.transport_config(transport());
+    config.transport_config(transport(RECEIVE_WINDOW_BYTES));
     let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
     let socket = std::net::UdpSocket::bind(any).map_err(|error| Error::new(ExitCode::Farm, format!("no UDP socket: {error}")))?;
     let mut endpoint = endpoint(EndpointConfig::default(), None, socket)?;
@@ -124,7 +143,7 @@ impl HmacKey for ResetKey {
     }
 }
 
-fn transport() -> Arc<TransportConfig> {
+fn transport(receive_window: u32) -> Arc<TransportConfig> {
     let mut config = TransportConfig::default();
     config
         .max_idle_timeout(IdleTimeout::try_from(IDLE_TIMEOUT).ok())
@@ -132,7 +151,7 @@ fn transport() -> Arc<TransportConfig> {
         .max_concurrent_bidi_streams(VarInt::from_u32(STREAMS_PER_PEER))
         .max_concurrent_uni_streams(VarInt::from_u32(STREAMS_PER_PEER))
         .stream_receive_window(VarInt::from_u32(STREAM_WINDOW_BYTES))
-        .receive_window(VarInt::from_u32(RECEIVE_WINDOW_BYTES))
+        .receive_window(VarInt::from_u32(receive_window))
         .send_window(u64::from(RECEIVE_WINDOW_BYTES));
     Arc::new(config)
 }
@@ -145,6 +164,6 @@ fn roots(identity: &Identity) -> Result<Arc<RootCertStore>> {
     Ok(Arc::new(roots))
 }
 
-fn tls(error: impl std::fmt::Display) -> Error {
+pub(super) fn tls(error: impl std::fmt::Display) -> Error {
     Error::new(ExitCode::File, format!("these keys cannot be used: {error}"))
 }

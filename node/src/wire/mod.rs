@@ -9,16 +9,20 @@
 //! | node | unidirectional, one a part | [`PartHeader`], then its pixels |
 //! | node | datagrams | [`Heartbeat`] |
 //! | submitter, observer, operator | bidirectional, one a request | a [`Request`], answered by [`Response`] frames |
+//!
+//! Joining, and renewing a key, has a protocol of its own: [`JoinRequest`] on one bidirectional stream, answered by a [`JoinResponse`].
 
 mod endpoint;
 mod frame;
+mod join;
 mod message;
 mod refusal;
 mod request;
 pub mod tls;
 
-pub use endpoint::{client, connect, server};
+pub use endpoint::{JOIN_ALPN, client, connect, renewer, server};
 pub use frame::{FrameError, decode, encode, read, read_exactly, write};
+pub use join::{JoinRequest, JoinResponse, NewKey, joiner, requested_key};
 pub use message::{FromNode, Heartbeat, Hello, NodeStream, PartHeader, ToNode};
 pub use refusal::{Refusal, explain, explain_peer, peer_certificate};
 pub use request::{FileHeader, JobState, JobStatus, NodeStatus, Request, Response, Status, is_plain_name};

@@ -46,6 +46,7 @@ mod alert {
     pub const BAD_CERTIFICATE: u8 = 42;
     pub const UNSUPPORTED_CERTIFICATE: u8 = 43;
     pub const CERTIFICATE_EXPIRED: u8 = 45;
+    pub const CERTIFICATE_UNKNOWN: u8 = 46;
     pub const UNKNOWN_CA: u8 = 48;
     pub const DECRYPT_ERROR: u8 = 51;
     pub const CERTIFICATE_REQUIRED: u8 = 116;
@@ -65,7 +66,7 @@ pub fn explain(error: &ConnectionError) -> Refusal {
                 Refusal::denied("the coordinator's certificate is not of the farm of this key", FOREIGN)
             }
             Some(alert::CERTIFICATE_EXPIRED) => Refusal::denied("the coordinator's certificate is not valid now", RENEW),
-            Some(alert::BAD_CERTIFICATE | alert::UNSUPPORTED_CERTIFICATE) => {
+            Some(alert::BAD_CERTIFICATE | alert::UNSUPPORTED_CERTIFICATE | alert::CERTIFICATE_UNKNOWN) => {
                 Refusal::denied("what answers there has a certificate of this farm, but not that of a coordinator", ROLE)
             }
             _ => Refusal::other(error.to_string()),
@@ -77,7 +78,7 @@ pub fn explain(error: &ConnectionError) -> Refusal {
             Some(alert::CERTIFICATE_EXPIRED) => {
                 Refusal::denied("the coordinator refuses this key's certificate: it is not valid now", RENEW)
             }
-            Some(alert::BAD_CERTIFICATE | alert::UNSUPPORTED_CERTIFICATE) => {
+            Some(alert::BAD_CERTIFICATE | alert::UNSUPPORTED_CERTIFICATE | alert::CERTIFICATE_UNKNOWN) => {
                 Refusal::denied("the coordinator refuses this key's certificate: it is not that of a client or a node", ROLE)
             }
             Some(alert::CERTIFICATE_REQUIRED) => {
@@ -124,5 +125,5 @@ pub fn explain_peer(error: &ConnectionError) -> String {
 /// What the peer proved itself with; nothing if it did not.
 pub fn peer_certificate(connection: &quinn::Connection) -> Option<Result<Certificate, String>> {
     let identity = connection.peer_identity()?.downcast::<Vec<rustls::pki_types::CertificateDer<'static>>>().ok()?;
-    identity.first().map(Certificate::read)
+    Some(Certificate::read(&identity))
 }

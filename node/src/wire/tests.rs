@@ -146,7 +146,7 @@ fn only_plain_names_name_output_files() {
 
 /// Lets one identity connect to another: whom the one that listens sees, or what the other is told.
 async fn meet(listens: &Identity, connects: &Identity) -> Result<Peer, Refusal> {
-    let listening = super::server(std::net::SocketAddr::from(([127, 0, 0, 1], 0)), listens).unwrap();
+    let listening = super::server(std::net::SocketAddr::from(([127, 0, 0, 1], 0)), listens, false).unwrap();
     let address = listening.local_addr().unwrap();
     let accepting = listening.clone();
     let accepted = tokio::spawn(async move { accepting.accept().await.unwrap().await });
@@ -172,6 +172,23 @@ async fn nobody_passes_for_another() {
     }
     let refusal = meet(&coordinator, &coordinator).await.unwrap_err();
     assert!(refusal.denied && refusal.message.contains("not that of a client or a node"), "a coordinator as client: {refusal}");
+}
+
+/// What a coordinator holds is worth no more than those who join: whoever steals it becomes neither operator nor coordinator.
+#[tokio::test]
+async fn an_issuer_certifies_those_who_join_and_nobody_else() {
+    let authority = Authority::new().unwrap();
+    let issuer = authority.delegate().unwrap();
+    let coordinator = authority.issue(Role::Coordinator, "lead").unwrap();
+    for &role in Role::JOINING {
+        let joined = issuer.issue(role, "attic").unwrap();
+        assert_eq!(meet(&coordinator, &joined).await.unwrap(), *joined.peer());
+    }
+    let refusal = meet(&coordinator, &issuer.issue(Role::Operator, "thief").unwrap()).await.unwrap_err();
+    assert!(refusal.denied, "{refusal}");
+    let node = authority.issue(Role::Node, "attic").unwrap();
+    let refusal = meet(&issuer.issue(Role::Coordinator, "thief").unwrap(), &node).await.unwrap_err();
+    assert!(refusal.denied, "{refusal}");
 }
 
 #[tokio::test]

@@ -7,12 +7,12 @@ use std::{
 };
 
 use rcgen::{
-    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, IsCa, Issuer, KeyPair, KeyUsagePurpose, PublicKeyData,
-    date_time_ymd,
+    BasicConstraints, CertificateParams, DnType, ExtendedKeyUsagePurpose, GeneralSubtree, IsCa, Issuer, KeyPair, KeyUsagePurpose,
+    NameConstraints, PublicKeyData, date_time_ymd,
 };
 use rustls::pki_types::{CertificateDer, pem::PemObject};
 
-use super::{Identity, Peer, Role, private, random};
+use super::{Certificate, Fingerprint, Identity, Peer, Role, private, random};
 use crate::{
     error::{Error, ExitCode, Result},
     limits::{AUTHORITY_VALIDITY, CERTIFICATE_BACKDATE, CERTIFICATE_VALIDITY, NAME_BYTES},
@@ -20,6 +20,9 @@ use crate::{
 
 /// The file of a farm's authority within its folder of keys.
 const AUTHORITY_FILE: &str = "authority.pem";
+
+/// The file of its issuer, in the same folder.
+const ISSUER_FILE: &str = "issuer.pem";
 
 /// A key that certifies others, and the certificates from its own up to the farm's authority, as PEM.
 pub struct Authority {
@@ -40,6 +43,39 @@ impl Authority {
         let key = KeyPair::generate().map_err(crypto)?;
         let chain = params.self_signed(&key).map_err(crypto)?.pem();
         Ok(Self { chain, issuer: Issuer::new(params, key) })
+    }
+
+    /// An issuer for a coordinator: it certifies those who join, and its own certificate says that it can certify no one else.
+    ///
+    /// # Errors
+    /// When the machine has no randomness to give.
+    pub fn delegate(&self) -> Result<Self> {
+        let mut params = params(&format!("Tessera issuer {:016x}", random()), Vec::new(), AUTHORITY_VALIDITY)?;
+        params.is_ca = IsCa::Ca(BasicConstraints::Constrained(0));
+        params.key_usages = vec![KeyUsagePurpose::KeyCertSign];
+        params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ClientAuth];
+        let permitted_subtrees = Role::JOINING.iter().map(|role| GeneralSubtree::DnsName(role.dns_name())).collect();
+        params.name_constraints = Some(NameConstraints { permitted_subtrees, excluded_subtrees: Vec::new() });
+        let key = KeyPair::generate().map_err(crypto)?;
+        let certificate = params.signed_by(&key, &self.issuer).map_err(crypto)?;
+        Ok(Self { chain: format!("{}{}", certificate.pem(), self.chain), issuer: Issuer::new(params, key) })
+    }
+
+    /// The issuer in a file, or in the folder of a farm's authority.
+    ///
+    /// # Errors
+    /// When there is none, or others may read its key.
+    pub fn load_issuer(path: &Path) -> Result<Self> {
+        let file = if path.is_dir() { path.join(ISSUER_FILE) } else { path.to_owned() };
+        Self::read(&file).map_err(|error| error.with_help("make an issuer with: tessera keys issuer --keys DIR"))
+    }
+
+    /// Writes the issuer beside the authority.
+    ///
+    /// # Errors
+    /// As [`Self::save`].
+    pub fn save_issuer(&self, folder: &Path) -> Result<PathBuf> {
+        self.save_as(&folder.join(ISSUER_FILE))
     }
 
     /// The authority whose keys lie in this folder.
@@ -71,9 +107,23 @@ impl Authority {
     /// When there is one already, or the folder cannot be written.
     pub fn save(&self, folder: &Path) -> Result<PathBuf> {
         fs::create_dir_all(folder).map_err(|error| Error::new(ExitCode::File, format!("{}: {error}", folder.display())))?;
-        let path = folder.join(AUTHORITY_FILE);
-        private::write(&path, &format!("{}{}", self.issuer.key().serialize_pem(), self.chain))?;
-        Ok(path)
+        self.save_as(&folder.join(AUTHORITY_FILE))
+    }
+
+    fn save_as(&self, path: &Path) -> Result<PathBuf> {
+        private::write(path, &format!("{}{}", self.issuer.key().serialize_pem(), self.chain))?;
+        Ok(path.to_owned())
+    }
+
+    /// The fingerprint of the farm's authority.
+    pub(super) fn root(&self) -> Result<Fingerprint, String> {
+        let root = CertificateDer::pem_slice_iter(self.chain.as_bytes()).last().ok_or("no certificate")?;
+        Certificate::fingerprint(&root.map_err(|error| error.to_string())?)
+    }
+
+    /// Its private key.
+    pub(super) fn secret(&self) -> Vec<u8> {
+        self.issuer.key().serialize_der()
     }
 
     /// Certifies a new key.
@@ -123,7 +173,10 @@ impl Authority {
 }
 
 /// Refuses names that could mislead in a log or a path.
-fn check_name(name: &str) -> Result<()> {
+///
+/// # Errors
+/// Exactly then.
+pub fn check_name(name: &str) -> Result<()> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-".contains(c);
     if name.is_empty() || name.len() > NAME_BYTES || !name.chars().all(plain) {
         return Err(Error::new(ExitCode::Usage, format!("the name {name:?} cannot stand in a certificate"))

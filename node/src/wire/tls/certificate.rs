@@ -40,6 +40,8 @@ pub struct Certificate {
     pub peer: Peer,
     /// Which it is.
     pub fingerprint: Fingerprint,
+    /// Those above it, up to the farm's authority.
+    pub above: Vec<Fingerprint>,
     /// When it was made, to the second.
     pub issued: SystemTime,
     /// When it ends.
@@ -47,11 +49,12 @@ pub struct Certificate {
 }
 
 impl Certificate {
-    /// Reads a certificate.
+    /// Reads a certificate, which comes first, and those above it.
     ///
     /// # Errors
     /// When it is none of a farm.
-    pub fn read(der: &CertificateDer<'_>) -> Result<Self, String> {
+    pub fn read(chain: &[CertificateDer<'_>]) -> Result<Self, String> {
+        let (der, above) = chain.split_first().ok_or("no certificate")?;
         let (_, parsed) = x509_parser::parse_x509_certificate(der).map_err(|error| format!("unreadable certificate: {error}"))?;
         let name = parsed.subject().iter_common_name().next().and_then(|name| name.as_str().ok()).ok_or("a certificate without a name")?;
         let peer = Peer { role: role(&parsed)?, name: name.to_owned() };
@@ -59,9 +62,19 @@ impl Certificate {
         Ok(Self {
             peer,
             fingerprint: blake3::hash(parsed.tbs_certificate.as_ref()),
+            above: above.iter().map(Self::fingerprint).collect::<Result<_, _>>()?,
             issued: moment(validity.not_before.timestamp()) + CERTIFICATE_BACKDATE,
             expires: moment(validity.not_after.timestamp()),
         })
+    }
+
+    /// The fingerprint of any certificate.
+    ///
+    /// # Errors
+    /// When it is none.
+    pub fn fingerprint(der: &CertificateDer<'_>) -> Result<Fingerprint, String> {
+        let (_, parsed) = x509_parser::parse_x509_certificate(der).map_err(|error| format!("unreadable certificate: {error}"))?;
+        Ok(blake3::hash(parsed.tbs_certificate.as_ref()))
     }
 
     /// What is wrong with its time, if anything.

@@ -7,9 +7,13 @@ use std::{
 };
 
 use rcgen::KeyPair;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject};
+use rustls::{
+    crypto::ring,
+    pki_types::{CertificateDer, PrivateKeyDer, pem::PemObject},
+    sign::CertifiedKey,
+};
 
-use super::{Certificate, Peer, Role, private};
+use super::{Certificate, Fingerprint, Peer, Role, private};
 use crate::error::{Error, ExitCode, Result};
 
 /// A key, its certificate, and those above it up to the farm's authority.
@@ -30,15 +34,14 @@ impl Clone for Identity {
 }
 
 impl Identity {
-    pub(super) fn parse(pem: &str) -> Result<Self, String> {
+    pub(in crate::wire) fn parse(pem: &str) -> Result<Self, String> {
         let chain: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(pem.as_bytes()).collect();
         let chain = chain.map_err(|error| error.to_string())?;
-        let own = chain.first().ok_or("its certificate is missing")?;
         if chain.len() < 2 {
             return Err("the farm's certificate is missing".to_owned());
         }
         let key = PrivateKeyDer::from_pem_slice(pem.as_bytes()).map_err(|error| format!("its key: {error}"))?;
-        Ok(Self { certificate: Certificate::read(own)?, chain, key, pem: pem.to_owned() })
+        Ok(Self { certificate: Certificate::read(&chain)?, chain, key, pem: pem.to_owned() })
     }
 
     /// Whose it is.
@@ -49,6 +52,20 @@ impl Identity {
     /// The farm's authority.
     pub(in crate::wire) fn authority(&self) -> Option<&CertificateDer<'static>> {
         self.chain.last()
+    }
+
+    /// The fingerprint of the farm's authority.
+    pub fn authority_fingerprint(&self) -> Option<Fingerprint> {
+        self.certificate.above.last().copied()
+    }
+
+    /// Whether key and certificate belong together.
+    ///
+    /// # Errors
+    /// In words, when they do not.
+    pub(in crate::wire) fn check_key(&self) -> Result<(), String> {
+        let pair = CertifiedKey::from_der(self.chain.clone(), self.key.clone_key(), &ring::default_provider());
+        pair.map(drop).map_err(|error| error.to_string())
     }
 
     /// Reads the identity of a role from its file, or from a folder that holds one of that role.

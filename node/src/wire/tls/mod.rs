@@ -8,17 +8,22 @@ mod authority;
 mod certificate;
 mod identity;
 mod private;
+mod revocation;
 mod role;
+mod token;
 #[cfg(test)]
 mod tests;
 
 use rustls::crypto::ring;
 
 pub use self::{
-    authority::Authority,
+    authority::{Authority, check_name},
     certificate::{Certificate, Fingerprint, Peer},
     identity::Identity,
+    private::write as write_private,
+    revocation::{Revocation, Revocations, Revoked},
     role::{Deed, Role},
+    token::Token,
 };
 
 /// A number that nobody can guess.

@@ -2,8 +2,10 @@
 
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
+
 /// What the owner of a certificate is in the farm.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, clap::ValueEnum)]
 pub enum Role {
     /// Leads the farm.
     Coordinator,
@@ -56,6 +58,9 @@ impl fmt::Display for Deed {
 impl Role {
     /// Those who ask a coordinator for something.
     pub const CLIENTS: &[Self] = &[Self::Operator, Self::Submitter, Self::Observer];
+
+    /// Those whom an issuer can certify, and so whoever got hold of one.
+    pub const JOINING: &[Self] = &[Self::Node, Self::Submitter, Self::Observer];
 
     /// All of them.
     pub const ALL: &[Self] = &[Self::Coordinator, Self::Node, Self::Submitter, Self::Observer, Self::Operator];

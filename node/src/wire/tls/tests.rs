@@ -20,7 +20,7 @@ fn a_certificate_says_role_and_name() {
         assert_eq!(*identity.peer(), Peer { role, name: "attic-2".to_owned() });
     }
     let above = authority.issue(Role::Node, "x").unwrap().authority().cloned().unwrap();
-    assert!(Certificate::read(&above).is_err(), "the authority itself has no role");
+    assert!(Certificate::read(&[above]).is_err(), "the authority itself has no role");
 }
 
 #[test]
@@ -90,4 +90,50 @@ fn roles_may_do_what_the_guide_says() {
     ] {
         assert_eq!(deeds.map(|(deed, own)| role.may(deed, own)), may, "{role}");
     }
+}
+
+#[test]
+fn a_token_is_believed_while_it_lasts_and_where_it_was_made() {
+    let authority = Authority::new().unwrap();
+    let issuer = authority.delegate().unwrap();
+    let (token, text) = issuer.make_token(Role::Node, Some("attic".to_owned()), 1, Duration::from_secs(60)).unwrap();
+    let now = SystemTime::now();
+    assert_eq!(issuer.check_token(&format!(" {text}\n"), now).unwrap(), token);
+    assert_eq!(Token::read(&text).unwrap(), token);
+    assert_eq!(Some(token.authority), issuer.issue(Role::Node, "x").unwrap().authority_fingerprint().map(|print| *print.as_bytes()));
+    assert!(issuer.check_token(&text, now + Duration::from_secs(61)).unwrap_err().contains("expired"));
+    assert!(authority.delegate().unwrap().check_token(&text, now).unwrap_err().contains("not made with the issuer"));
+    let mut forged = text.clone().into_bytes();
+    let place = forged.len() / 2;
+    forged[place] = if forged[place] == b'a' { b'b' } else { b'a' };
+    assert!(issuer.check_token(std::str::from_utf8(&forged).unwrap(), now).is_err());
+    assert!(Token::read("no token").is_err() && Token::read(&text[..text.len() - 8]).is_err_and(|error| error.contains("no join token")));
+}
+
+#[test]
+fn a_list_revokes_what_it_names_and_nothing_younger() {
+    let folder = tempfile::tempdir().unwrap();
+    let authority = Authority::new().unwrap();
+    let issuer = authority.delegate().unwrap();
+    let (attic, cellar) =
+        (authority.issue(Role::Node, "attic").unwrap().certificate, issuer.issue(Role::Node, "cellar").unwrap().certificate);
+    let path = folder.path().join("revoked");
+    let with = |entry: Revocation| {
+        let mut list = Revocations::default();
+        list.add(entry);
+        fs::write(&path, list.text().unwrap()).unwrap();
+        Revocations::read(&path).unwrap()
+    };
+    assert!(Revocations::read(&path).unwrap().is_empty(), "no list revokes nothing");
+    let list = with(Revocation::now(Revoked::Name("attic".to_owned()), "stolen"));
+    assert_eq!(list.refuse(&attic).unwrap(), "the certificate of node attic was revoked: stolen");
+    assert_eq!(list.refuse(&cellar), None);
+    let younger = Certificate { issued: attic.issued + Duration::from_secs(2), ..attic.clone() };
+    assert_eq!(list.refuse(&younger), None, "a name may come back with a new key");
+    let list = with(Revocation::now(Revoked::Certificate(cellar.fingerprint.to_string()), ""));
+    assert!(list.refuse(&cellar).is_some() && list.refuse(&attic).is_none());
+    let list = with(Revocation::now(Revoked::Certificate(cellar.above[0].to_string()), ""));
+    assert!(list.refuse(&cellar).is_some() && list.refuse(&attic).is_none(), "an issuer takes with it what it certified");
+    fs::write(&path, "{\"name\":\"attic\",\"at\":1}\nnonsense\n").unwrap();
+    assert!(Revocations::read(&path).unwrap_err().contains("revoked:2:"));
 }
