@@ -10,6 +10,8 @@
 //! revoked = "/etc/tessera/revoked"     # list of revoked certificates
 //! no_node_timeout = 60.0          # seconds
 //! free_bytes = 1073741824         # stay free on the disk: jobs that would need them are refused
+//! keep_days = 30.0                # jobs that are over are deleted after that
+//! keep_bytes = 107374182400       # of all of them; the oldest are deleted first
 //!
 //! [node]
 //! coordinator = "farm.example:7143"
@@ -61,6 +63,10 @@ pub struct CoordinatorConfig {
     pub no_node_timeout: Option<f64>,
     /// Bytes that stay free on its disk.
     pub free_bytes: Option<u64>,
+    /// Days for which jobs that are over are kept.
+    pub keep_days: Option<f64>,
+    /// Bytes of all jobs that are over.
+    pub keep_bytes: Option<u64>,
 }
 
 /// Settings of `tessera node`.

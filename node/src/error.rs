@@ -68,3 +68,20 @@ impl fmt::Display for Error {
 }
 
 impl std::error::Error for Error {}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    /// Codes are a promise to scripts, so every one of them is listed for those who write scripts, and no other.
+    #[test]
+    fn the_readme_lists_every_exit_code() {
+        let codes = include_str!("error.rs").lines().filter_map(|line| line.strip_prefix("    ")?.strip_suffix(',')?.split_once(" = "));
+        let codes = codes.filter(|(name, _)| name.chars().all(char::is_alphanumeric)).filter_map(|(_, code)| code.parse().ok());
+        let codes: BTreeSet<u8> = codes.chain([0]).collect();
+        assert!(codes.contains(&130) && codes.len() > 7, "{codes:?}");
+        let readme = include_str!("../../README.md");
+        let rows = readme.lines().filter_map(|line| line.strip_prefix("| `")?.split_once('`')?.0.parse().ok());
+        assert_eq!(rows.collect::<BTreeSet<u8>>(), codes);
+    }
+}

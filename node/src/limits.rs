@@ -43,6 +43,9 @@ pub const COORDINATOR_SILENCE: Duration = Duration::from_secs(3);
 /// How long a connection may take to stand.
 pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
+/// Silence of a coordinator after which a client says that it waits.
+pub const SILENCE_SAID_AFTER: Duration = Duration::from_millis(500);
+
 /// Pauses between a node's attempts to connect: from the first, doubling, to the last.
 pub const RECONNECT_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(5));
 
@@ -99,6 +102,18 @@ pub const SPACE_INTERVAL: Duration = Duration::from_secs(5);
 
 /// Bytes that stay free on the coordinator's disk, if it is not told otherwise: jobs that would need them are refused.
 pub const FREE_BYTES: u64 = 1 << 30;
+
+/// How long jobs that are over are kept, with their files, if the coordinator is not told otherwise.
+pub const KEPT_FOR: Duration = Duration::from_secs(30 * 86_400);
+
+/// Bytes of all jobs that are over, if the coordinator is not told otherwise; the oldest go first.
+pub const KEPT_BYTES: u64 = 100 << 30;
+
+/// How long a job that is over stays whatever the limits say: its client may be about to fetch its files.
+pub const KEPT_AT_LEAST: Duration = Duration::from_secs(3600);
+
+/// How often the coordinator removes old jobs, and assets that no job needs.
+pub const SWEEP_INTERVAL: Duration = Duration::from_secs(600);
 
 /// How often the farm's status is published to those who watch.
 pub const STATUS_INTERVAL: Duration = Duration::from_millis(100);
@@ -221,6 +236,9 @@ pub const JOBS_KEPT: usize = 100;
 
 /// Events in a journal beyond which it is begun anew once all its jobs are over: a bound of the time that a start takes.
 pub const JOURNAL_EVENTS: u64 = 100_000;
+
+/// How long a running farm has been without jobs before that: what clients and policies of the last one may still say comes sooner.
+pub const JOURNAL_REST: Duration = POLICY_PATIENCE.saturating_add(Duration::from_secs(60));
 
 /// Entries in the list of a job's events; later ones are counted, not listed.
 pub const EVENTS_PER_JOB: usize = 100_000;

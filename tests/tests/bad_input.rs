@@ -37,6 +37,12 @@ fn each_mistake_has_its_message_and_its_exit_code() {
     let good = sphere("tessera.diffuse {}");
     let cases = [
         ("a script that is not there", None, 3, "cannot read bad.lua"),
+        (
+            "a module that is misspelt",
+            Some(job(&good, "").replace(r#"require("tessera")"#, r#"require("tesera")"#)),
+            3,
+            r#"bad.lua:1: require: no module "tesera"; did you mean "tessera"?"#,
+        ),
         ("a syntax error", Some("return tessera.job {".to_owned()), 3, "bad.lua:1: syntax error"),
         ("an unknown key", Some(job(&sphere("tessera.diffuse { reflectnce = 1 }"), "")), 3, "did you mean `reflectance`"),
         ("a film of size zero", Some(job(&good, "").replace("width = 64", "width = 0")), 3, "bad.lua:2: job: film: `width`"),
@@ -68,6 +74,45 @@ fn each_mistake_has_its_message_and_its_exit_code() {
         let left = fs::read_dir(program.path("out")).map_or(0, Iterator::count);
         assert_eq!(left, 0, "{what} left files behind");
     }
+}
+
+#[test]
+fn what_is_no_file_is_not_waited_for() {
+    let program = Program::new(BINARY);
+    let pipe = program.path("pipe.lua");
+    rustix::fs::mknodat(rustix::fs::CWD, &pipe, rustix::fs::FileType::Fifo, rustix::fs::Mode::RUSR, 0).unwrap();
+    for script in ["pipe.lua", "/dev/zero", "."] {
+        let finished = program.run(&["check", script]);
+        assert_eq!(finished.code, Some(3), "{script}: {}", finished.errors);
+        assert!(finished.errors.contains("it is not a file"), "{script}: {}", finished.errors);
+    }
+}
+
+/// What a model's file has and this program does not model is said once, at the beginning, and stands in the manifest.
+#[test]
+fn a_warning_is_said_once() {
+    let program = Program::new(BINARY);
+    let model = "v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl nowhere\nf 1 2 3\n";
+    fs::write(program.path("model.obj"), model).unwrap();
+    fs::write(program.path("warns.lua"), job(r#"tessera.model { file = "model.obj" }"#, "")).unwrap();
+    let finished = program.run(&["render", "warns.lua", "-o", "out"]);
+    assert_eq!(finished.code, Some(0), "{}", finished.errors);
+    let said = finished.lines.iter().map(String::as_str).chain(finished.errors.lines()).filter(|line| line.contains("warning:")).count();
+    assert_eq!(said, 1, "{}\n{}", finished.errors, finished.lines.join("\n"));
+    assert_eq!(manifest(&program.path("out/warns.manifest.json"))["warnings"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn a_number_that_is_none_and_a_coordinator_that_is_not_there_are_named() {
+    let program = Program::new(BINARY);
+    program.make_keys("keys", &[]);
+    let access = ["--coordinator", "127.0.0.1:9", "--keys", "keys"];
+    let finished = program.run(&[&["watch", "abc"][..], &access].concat());
+    assert_eq!(finished.code, Some(2), "{}", finished.errors);
+    assert!(finished.errors.contains("a job's number is expected"), "{}", finished.errors);
+    let finished = program.run(&[&["list"][..], &access].concat());
+    assert_eq!(finished.code, Some(5), "{}", finished.errors);
+    assert!(finished.errors.contains("connecting to 127.0.0.1:9: no answer yet\nerror: cannot reach"), "{}", finished.errors);
 }
 
 #[test]

@@ -9,6 +9,7 @@ use std::{
 };
 
 use rustix::process::Signal;
+use serde_json::Value;
 use tessera_tests::farm::{PATIENCE, Program, Running, signal};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_tessera-under-test");
@@ -100,4 +101,92 @@ fn a_disk_without_room_takes_no_job_and_says_so_everywhere() {
     assert_eq!(metric(&page, "tessera_refuses_jobs"), 1.0);
     let status = program.run(&[&["status"][..], &access].concat());
     assert!(status.lines[0].contains("no job is taken now"), "{:?}", status.lines);
+}
+
+fn jobs(program: &Program, address: &str) -> Vec<(u64, String)> {
+    let listed = program.run(&["list", "--json", "--coordinator", address, "--keys", "keys"]);
+    assert_eq!(listed.code, Some(0), "{}", listed.errors);
+    let jobs: Value = serde_json::from_str(&listed.lines.concat()).unwrap();
+    let word = |state: &Value| state.as_str().map_or_else(|| state.as_object().unwrap().keys().next().unwrap().clone(), str::to_owned);
+    jobs.as_array().unwrap().iter().map(|job| (job["job"].as_u64().unwrap(), word(&job["state"]))).collect()
+}
+
+fn assets(program: &Program) -> usize {
+    fs::read_dir(program.path("data/assets")).unwrap().count()
+}
+
+/// The same picture again and again: all jobs share their assets. What one leaves behind is what the other lives on.
+#[test]
+fn deleting_a_job_takes_nothing_from_another_that_waits_and_all_goes_with_the_last() {
+    let program = Program::new(BINARY);
+    program.make_keys("keys", &["attic"]);
+    let (coordinator, address) = program.coordinator("keys", &[]);
+    let access = ["--coordinator", &address, "--keys", "keys"];
+    let run = |arguments: &[&str]| program.run(&[arguments, &access].concat());
+    let node = program.node(&address, "keys/node-attic.pem");
+    let first = run(&["render", "job.lua", "-o", "first", "-q", "--set", "samples=1", "--min-nodes", "1"]);
+    assert_eq!(first.code, Some(0), "{}", first.errors);
+    node.kill();
+    assert_eq!(jobs(&program, &address), [(1, "finished".to_owned())]);
+    let submitted = run(&["submit", "job.lua", "--set", "samples=1"]);
+    assert_eq!(submitted.lines, ["2"], "{}", submitted.errors);
+    assert_eq!(assets(&program), 1, "both have one frame");
+
+    let refused = run(&["delete", "2"]);
+    assert_eq!(refused.code, Some(5), "{}", refused.errors);
+    assert!(refused.errors.contains("waits or runs: `tessera cancel 2`"), "{}", refused.errors);
+    let deleted = run(&["delete", "1"]);
+    assert_eq!((deleted.code, deleted.lines.concat()), (Some(0), "job 1 is deleted".to_owned()), "{}", deleted.errors);
+    assert_eq!(assets(&program), 1, "job 2 needs it");
+    assert!(jobs(&program, &address).iter().all(|(job, _)| *job == 2));
+    assert!(!program.path("data/jobs/1").exists());
+    assert_eq!(run(&["fetch", "1", "-o", "gone"]).code, Some(5));
+    assert_eq!(run(&["watch", "1"]).code, Some(5));
+
+    // The node must fetch the frame anew; the coordinator must know job 2 after a start, and nothing of job 1.
+    coordinator.kill();
+    let (coordinator, _) = program.coordinator_at(&address, "keys", &[]);
+    let _node = program.node(&address, "keys/node-attic.pem");
+    let watched = run(&["watch", "2", "-q"]);
+    assert_eq!(watched.code, Some(0), "{}", watched.errors);
+    assert_eq!(run(&["fetch", "2", "-o", "second"]).code, Some(0));
+    assert!(fs::read(program.path("first/job.exr")).unwrap() == fs::read(program.path("second/job.exr")).unwrap());
+    assert_eq!(jobs(&program, &address), [(2, "finished".to_owned())]);
+
+    assert_eq!(run(&["delete", "2"]).code, Some(0));
+    assert_eq!((jobs(&program, &address).len(), assets(&program)), (0, 0));
+    let status = program.wait_for_status(&address, "keys", |status| status["jobs"].as_array().unwrap().is_empty());
+    assert!(status["refusal"].is_null());
+    coordinator.kill();
+    let (_coordinator, _) = program.coordinator_at(&address, "keys", &[]);
+    let submitted = run(&["submit", "job.lua", "--set", "samples=1"]);
+    assert_eq!(submitted.lines, ["3"], "a number comes once: {}", submitted.errors);
+    let cancelled = run(&["cancel", "3"]);
+    assert_eq!(cancelled.lines, ["job 3 is cancelled"], "{}", cancelled.errors);
+    wait_for("its end is on disk", || jobs(&program, &address) == [(3, "cancelled".to_owned())]);
+}
+
+#[test]
+fn a_job_whose_folder_refuses_its_files_is_named_wherever_one_looks() {
+    let program = Program::new(BINARY);
+    program.make_keys("keys", &["attic"]);
+    let (coordinator, address, page) = with_page(&program, &[]);
+    let access = ["--coordinator", &address, "--keys", "keys"];
+    let submitted = program.run(&[&["submit", "job.lua", "--set", "samples=1"][..], &access].concat());
+    assert_eq!(submitted.code, Some(0), "{}", submitted.errors);
+    let files = program.path("data/jobs/1/files");
+    fs::remove_dir(&files).unwrap();
+    fs::write(&files, "in the way").unwrap();
+    let _node = program.node(&address, "keys/node-attic.pem");
+    let status = program.wait_for_status(&address, "keys", |status| status["jobs"][0]["trouble"].is_string());
+    assert!(status["jobs"][0]["trouble"].as_str().unwrap().contains("its files cannot be written"), "{status:#}");
+    wait_for("the page says it", || metric(&page, "tessera_jobs_held_up") == 1.0);
+    assert!(get(&page, "/status.json").1.contains("its files cannot be written"));
+    let status = program.run(&[&["status"][..], &access].concat());
+    assert!(status.lines.iter().any(|line| line.contains("writing: its files cannot be written")), "{:?}", status.lines);
+    let cancelled = program.run(&[&["cancel", "1"][..], &access].concat());
+    assert_eq!(cancelled.code, Some(0), "{}", cancelled.errors);
+    wait_for("others go on", || metric(&page, "tessera_jobs_held_up") == 0.0);
+    let log = coordinator.kill().errors;
+    assert_eq!(log.matches("until the disk takes its files").count(), 1, "once, not every second: {log}");
 }

@@ -39,6 +39,8 @@ fn each_role_does_what_it_may_and_nothing_else() {
         // It is theirs, and not done yet.
         (owner, &["fetch", job, "-o", "out"], Some(5)),
         (operator, &["fetch", job, "-o", "out"], Some(5)),
+        (observer, &["list"], Some(0)),
+        (other, &["delete", job], DENIED),
         (observer, &["cancel", job], DENIED),
         (other, &["cancel", job], DENIED),
         (owner, &["cancel", job], Some(0)),

@@ -1,7 +1,7 @@
 //! `tessera cancel`: ends a job.
 
 use super::{
-    client::Access,
+    client::{Access, job_number},
     runtime::{block_on, start_logs},
 };
 use crate::{error::Result, farm::JobId};
@@ -10,6 +10,7 @@ use crate::{error::Result, farm::JobId};
 #[derive(clap::Args)]
 pub struct Args {
     /// The job's number.
+    #[arg(value_parser = job_number)]
     job: u64,
     #[command(flatten)]
     access: Access,
@@ -22,6 +23,7 @@ pub fn run(args: Args) -> Result<()> {
         let client = args.access.connect().await?;
         client.cancel(JobId(args.job)).await?;
         client.close().await;
+        println!("job {} is cancelled", args.job);
         Ok(())
     })
 }

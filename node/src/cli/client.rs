@@ -9,14 +9,17 @@ use std::{
 
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
 use tessera_engine::description::{AssetSource, MemoryAssets};
-use tokio::{io::AsyncWriteExt, time::timeout};
+use tokio::{
+    io::AsyncWriteExt,
+    time::{sleep, timeout},
+};
 
 use crate::{
     error::{Error, ExitCode, Result},
     farm::JobId,
     job::JobDescription,
-    limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
-    wire::{self, FileHeader, JobState, JobStatus, NodeStatus, Refusal, Request, Response, Status, tls::Identity},
+    limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES, SILENCE_SAID_AFTER},
+    wire::{self, FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Refusal, Request, Response, Status, tls::Identity},
 };
 
 /// How subcommands find their coordinator.
@@ -40,6 +43,14 @@ impl Access {
     }
 }
 
+/// A job's number on the command line.
+///
+/// # Errors
+/// In words, when it is none.
+pub fn job_number(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| "a job's number is expected, as `tessera submit` prints it and `tessera list` shows it".to_owned())
+}
+
 /// A connection to a coordinator.
 pub struct Client {
     endpoint: Endpoint,
@@ -58,7 +69,7 @@ impl Client {
         }
         let socket = resolve(address).map_err(|error| unreachable(address, Refusal::other(error)))?;
         let endpoint = wire::client(identity, socket)?;
-        let connecting = timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket)).await;
+        let connecting = patiently(address, timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket))).await;
         let late = || Err(Refusal::other(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())));
         let connection = connecting.unwrap_or_else(|_| late()).map_err(|refusal| unreachable(address, refusal))?;
         Ok(Self { endpoint, connection, address: address.to_owned() })
@@ -180,6 +191,30 @@ impl Client {
         }
     }
 
+    /// Jobs that are kept.
+    ///
+    /// # Errors
+    /// When the coordinator is lost, or cannot read its folder.
+    pub async fn list(&self) -> Result<Vec<KeptJob>> {
+        let (_send, mut receive) = self.request(&Request::List).await?;
+        match self.response(&mut receive).await? {
+            Response::Jobs(jobs) => Ok(jobs),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    /// Deletes a job.
+    ///
+    /// # Errors
+    /// When it waits or runs, when there is none, or the coordinator is lost.
+    pub async fn delete(&self, job: JobId) -> Result<()> {
+        let (_send, mut receive) = self.request(&Request::Delete { job }).await?;
+        match self.response(&mut receive).await? {
+            Response::Done => Ok(()),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
     async fn request(&self, request: &Request) -> Result<(SendStream, RecvStream)> {
         let (mut send, receive) = self.connection.open_bi().await.map_err(|error| self.lost(error))?;
         wire::write(&mut send, request, REQUEST_BYTES).await.map_err(|error| self.lost(error))?;
@@ -212,6 +247,17 @@ pub fn unreachable(address: &str, refusal: Refusal) -> Error {
     let (code, what) = if refusal.denied { (ExitCode::Denied, "refused at") } else { (ExitCode::Farm, "cannot reach the coordinator at") };
     Error::new(code, format!("{what} {address}: {}", refusal.message))
         .with_help(refusal.help.unwrap_or("check the address, that the coordinator runs, and that the keys are of its farm"))
+}
+
+/// Waits for a connection, and says so where that takes long.
+async fn patiently<T>(address: &str, connecting: impl Future<Output = T>) -> T {
+    tokio::pin!(connecting);
+    tokio::select! {
+        done = &mut connecting => return done,
+        () = sleep(SILENCE_SAID_AFTER) => {}
+    }
+    eprintln!("connecting to {address}: no answer yet");
+    connecting.await
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Error {

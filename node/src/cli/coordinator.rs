@@ -13,10 +13,10 @@ use super::{
 };
 use crate::{
     config::{Config, PORT, required},
-    coordinator::{Coordinator, Options, Pulse},
+    coordinator::{Coordinator, Options, Pulse, Retention},
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
-    limits::{FREE_BYTES, NO_NODE_TIMEOUT},
+    limits::{FREE_BYTES, KEPT_BYTES, KEPT_FOR, NO_NODE_TIMEOUT},
     supervisor::{self, Watchdog},
     web,
     wire::tls::{Authority, Identity, Role},
@@ -65,6 +65,10 @@ pub fn run(args: Args) -> Result<()> {
         revoked: args.revoked.or(file.revoked),
         farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
         free_bytes: file.free_bytes.unwrap_or(FREE_BYTES),
+        retention: Retention {
+            age: file.keep_days.map_or(Ok(KEPT_FOR), |days| seconds(days * 86_400.0))?,
+            bytes: file.keep_bytes.unwrap_or(KEPT_BYTES),
+        },
     };
     if let Some(warning) = options.identity.warning() {
         tracing::warn!(warning, "renew the coordinator's key");

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::{
-    client::Access,
+    client::{Access, job_number},
     render::check_writable,
     runtime::{block_on, start_logs},
 };
@@ -13,6 +13,7 @@ use crate::{error::Result, farm::JobId};
 #[derive(clap::Args)]
 pub struct Args {
     /// The job's number.
+    #[arg(value_parser = job_number)]
     job: u64,
     #[command(flatten)]
     access: Access,

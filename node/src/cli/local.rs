@@ -12,7 +12,7 @@ use tokio::{
 
 use super::{client::Client, progress::Progress};
 use crate::{
-    coordinator::{Coordinator, Options},
+    coordinator::{Coordinator, Options, Retention},
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
     wire::tls::{Authority, Identity, Role},
@@ -44,6 +44,7 @@ impl LocalFarm {
             revoked: None,
             farm,
             free_bytes: 0,
+            retention: Retention::default(),
         };
         let coordinator = Coordinator::start(options).await?;
         let client = authority.issue(Role::Operator, "render")?;

@@ -8,11 +8,13 @@ mod cancel;
 mod check;
 mod client;
 mod coordinator;
+mod delete;
 mod direct;
 mod fetch;
 mod here;
 mod join;
 mod keys;
+mod list;
 mod local;
 mod node;
 mod plan;
@@ -60,6 +62,10 @@ enum Command {
     Fetch(fetch::Args),
     /// Ends a job.
     Cancel(cancel::Args),
+    /// Lists the jobs that a farm keeps, also those that are over.
+    List(list::Args),
+    /// Removes a job that is over from the farm's disk.
+    Delete(delete::Args),
     /// Runs a job script and says what would be rendered.
     Check(check::Args),
     /// The farm's authority, and the identities that it certifies.
@@ -86,6 +92,8 @@ fn run(command: Command) -> Result<()> {
         Command::Watch(args) => watch::run(args),
         Command::Fetch(args) => fetch::run(args),
         Command::Cancel(args) => cancel::run(args),
+        Command::List(args) => list::run(args),
+        Command::Delete(args) => delete::run(args),
         Command::Check(args) => check::run(args),
         Command::Keys(args) => keys::run(args),
         Command::Plan(args) => plan::run(args),

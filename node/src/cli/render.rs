@@ -21,7 +21,7 @@ use super::{
 use crate::{
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
-    job::LoadedJob,
+    job::{JobDescription, LoadedJob},
     limits::NO_NODE_TIMEOUT,
     manifest,
     report::{self, Style},
@@ -36,6 +36,9 @@ pub struct Args {
     /// Node processes on this machine.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1024))]
     nodes: u32,
+    /// Nodes that the job waits for before it begins, for a while [default: those of this machine; 1 on a farm].
+    #[arg(long, value_name = "NUMBER", conflicts_with = "threads")]
+    min_nodes: Option<u32>,
     /// Rendering threads of each node [default: the cores, shared out].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=4096))]
     lanes: Option<u32>,
@@ -72,17 +75,17 @@ pub fn run(args: Args) -> Result<()> {
     loaded.description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
     let files = block_on(async {
         match &args.coordinator {
-            Some(address) => on_farm(address, args.keys.as_deref(), &loaded, progress, &args.output).await,
+            Some(address) => on_farm(address, &args, &loaded, progress).await,
             None => here(&args, &loaded, progress).await,
         }
     })?;
-    report(args.show, &files, &args.output.join(&loaded.description.output.manifest))
+    report(args.show, &files, &args.output, &loaded.description)
 }
 
-async fn on_farm(address: &str, keys: Option<&Path>, loaded: &LoadedJob, progress: Progress, output: &Path) -> Result<Vec<PathBuf>> {
-    let keys = keys.ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
+async fn on_farm(address: &str, args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec<PathBuf>> {
+    let keys = args.keys.as_deref().ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
     let client = Client::connect(address, &Identity::load_client(keys)?).await?;
-    let files = follow(&client, loaded, 1, progress, output).await?;
+    let files = follow(&client, loaded, args.min_nodes.unwrap_or(1), progress, &args.output).await?;
     client.close().await;
     Ok(files)
 }
@@ -93,7 +96,7 @@ async fn here(args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec
     let farm = FarmConfig { no_node_timeout, ..FarmConfig::default() };
     let mut local = LocalFarm::start(args.nodes, lanes, farm, &progress).await?;
     let client = local.client().await?;
-    let work = follow(&client, loaded, args.nodes, progress, &args.output);
+    let work = follow(&client, loaded, args.min_nodes.unwrap_or(args.nodes), progress, &args.output);
     tokio::pin!(work);
     let files = loop {
         tokio::select! {
@@ -152,9 +155,10 @@ pub fn check_writable(folder: &Path) -> Result<()> {
     tempfile::tempfile_in(folder).map(drop).map_err(refused)
 }
 
-/// The report at the end.
-pub fn report(show: Show, files: &[PathBuf], manifest: &Path) -> Result<()> {
-    let manifest = manifest::read(manifest)?;
+/// The report at the end. What the job's description warns of was said at the beginning, and is not said again.
+pub fn report(show: Show, files: &[PathBuf], folder: &Path, description: &JobDescription) -> Result<()> {
+    let mut manifest = manifest::read(&folder.join(&description.output.manifest))?;
+    manifest.warnings.retain(|warning| !description.warnings.contains(warning));
     if show.json {
         event(&json!({ "event": "finished", "files": files, "report": manifest.report }));
     } else if !show.quiet {

@@ -28,6 +28,7 @@ pub fn run(args: Args) -> Result<()> {
     let manifests: Vec<Manifest> = args.manifests.iter().map(|path| manifest::read(path)).collect::<Result<_>>()?;
     if let Some(path) = &args.html {
         files::write_whole(path, report::html(&manifests).as_bytes())?;
+        eprintln!("wrote {}", path.display());
     }
     if args.json {
         let text = serde_json::to_string_pretty(&report::runs(&manifests));

@@ -59,5 +59,5 @@ pub fn run(args: Args) -> Result<()> {
         client.close().await;
         Ok(files)
     })?;
-    files.map_or(Ok(()), |files| report(args.show, &files, &args.output.join(&loaded.description.output.manifest)))
+    files.map_or(Ok(()), |files| report(args.show, &files, &args.output, &loaded.description))
 }

@@ -1,7 +1,7 @@
 //! `tessera watch`: follows a job to its end.
 
 use super::{
-    client::Access,
+    client::{Access, job_number},
     progress::Show,
     render::outcome,
     runtime::{block_on, start_logs},
@@ -12,6 +12,7 @@ use crate::{error::Result, farm::JobId};
 #[derive(clap::Args)]
 pub struct Args {
     /// The job's number.
+    #[arg(value_parser = job_number)]
     job: u64,
     #[command(flatten)]
     access: Access,

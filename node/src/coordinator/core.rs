@@ -73,6 +73,8 @@ pub struct Core {
     pub(super) jobs: BTreeMap<JobId, Known>,
     /// Who waits to hear that a job is taken.
     pub(super) unanswered: Unanswered,
+    /// When a job last ended.
+    pub(super) last_end: Instant,
     /// Why the disk takes no events and pixels.
     pub(super) disk_trouble: Option<String>,
     /// Why there is no room for more jobs.
@@ -99,14 +101,14 @@ impl Core {
         published: watch::Sender<Arc<Status>>,
     ) -> Result<Self> {
         let ids = farm.nodes().into_iter().map(|node| (node.name, node.id)).collect();
-        let known = farm.jobs().into_iter().filter_map(|job| Some((job.id, Known::new(shared.store.get_job(job.id).ok()?))));
-        let mut jobs: BTreeMap<JobId, Known> = known.collect();
-        for job in farm.jobs() {
-            let Some(known) = jobs.get_mut(&job.id) else { continue };
-            match &known.stored {
-                _ if job.outcome.is_some() => known.stored = None,
-                Some(stored) if job.phase != JobPhase::Waiting => thinker.load(job.id, &stored.description),
-                _ => {}
+        if let Err(error) = shared.store.settle(&farm.jobs()) {
+            tracing::warn!(%error, "jobs on disk could not be put in order; the next start tries again");
+        }
+        let known = farm.jobs().into_iter().filter_map(|job| Some((job.id, Known::again(&shared.store, &job)?)));
+        let jobs: BTreeMap<JobId, Known> = known.collect();
+        for job in farm.jobs().into_iter().filter(|job| job.phase != JobPhase::Waiting) {
+            if let Some(stored) = jobs.get(&job.id).and_then(|known| known.stored.as_ref()) {
+                thinker.load(job.id, &stored.description);
             }
         }
         let mut core = Self {
@@ -122,6 +124,7 @@ impl Core {
             ids,
             jobs,
             unanswered: BTreeMap::new(),
+            last_end: Instant::now(),
             disk_trouble: None,
             no_space: None,
             times: BTreeMap::new(),
@@ -136,6 +139,11 @@ impl Core {
     /// Steps through what the journal alone does not know: parts whose pixels reached the disk when their commit did not.
     fn recover(&mut self) -> Result<()> {
         for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()) {
+            if self.jobs.get(&job.id).is_none_or(|known| known.stored.is_none()) {
+                let reason = "its description on the coordinator's disk cannot be read any more".to_owned();
+                self.step(Event::JobCancelled { job: job.id, reason });
+                continue;
+            }
             let committed: BTreeSet<LeaseId> = self.farm.committed(job.id).into_iter().map(|(_, _, lease)| lease).collect();
             for lease in self.disk.pixels.stored(job.id)?.into_iter().filter(|lease| !committed.contains(lease)) {
                 self.step(Event::Committed { job: job.id, lease });
@@ -236,10 +244,12 @@ impl Core {
                 Ok(job) => self.answer_when_taken(job, reply),
                 Err(reason) => drop(reply.send(Err(reason))),
             },
+            Input::Rest => self.rest(),
             Input::Taken(job) => {
                 // Whoever asked may have gone meanwhile.
                 self.unanswered.remove(&job).into_iter().for_each(|reply| drop(reply.send(Ok(job))));
             }
+            Input::Delete { job, reply } => drop(reply.send(self.delete(job))),
             Input::Cancel { job, reason, reply } => {
                 let running = self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none());
                 if running {

@@ -16,7 +16,7 @@ use super::input::Input;
 use crate::{
     error::{Error, ExitCode, Result},
     farm::{Event, Farm, FarmConfig, JobId, LeaseId},
-    journal::{Filter, Journal},
+    journal::{Filter, Journal, renewed},
     limits::{DISK_RETRY, JOURNAL_BATCH},
     schedule::PartId,
     web::Metrics,
@@ -28,11 +28,13 @@ enum Deed {
     Store(JobId, PartId, LeaseId, Vec<u8>),
     Then(Box<dyn FnOnce() + Send>),
     Forget(JobId),
+    Renew(Vec<(Duration, Event)>),
 }
 
 /// The way to the journal. What waits there is bounded by what was handed out: pixels of the running job, and the events around them.
 pub struct Disk {
     deeds: Sender<Deed>,
+    config: FarmConfig,
     filter: Filter,
     metrics: Arc<Metrics>,
     /// For reading pixels back.
@@ -71,7 +73,7 @@ impl Disk {
     /// # Errors
     /// When the journal cannot be read, or another process holds it.
     pub fn open(folder: &Path, config: FarmConfig, inputs: InputSender<Input>, metrics: Arc<Metrics>) -> Result<(Self, Farm)> {
-        let (journal, recovered) = Journal::open(&folder.join("journal"), config)?;
+        let (journal, recovered) = Journal::open(&folder.join("journal"), config.clone())?;
         if recovered.events > 0 {
             tracing::info!(events = recovered.events, "the journal was replayed");
         }
@@ -81,7 +83,7 @@ impl Disk {
         thread.measure();
         let started = thread::Builder::new().name("journal".to_owned()).spawn(move || thread.run(&received));
         started.map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))?;
-        Ok((Self { deeds, filter: Filter::default(), metrics, pixels }, recovered.farm))
+        Ok((Self { deeds, config, filter: Filter::default(), metrics, pixels }, recovered.farm))
     }
 
     /// Notes an event that `farm` is about to take.
@@ -105,6 +107,14 @@ impl Disk {
     /// Forgets the pixels of a job that is over.
     pub fn forget(&self, job: JobId) {
         self.send(Deed::Forget(job));
+    }
+
+    /// Begins the journal anew, if that can be while `farm` stands as it does; returns the farm that goes on from there.
+    pub fn renew(&self, farm: &Farm) -> Option<Farm> {
+        let (farm, entries) = renewed(farm, self.config.clone())?;
+        tracing::info!(events = entries.len(), "the journal is begun anew");
+        self.send(Deed::Renew(entries));
+        Some(farm)
     }
 
     fn send(&self, deed: Deed) {
@@ -147,6 +157,7 @@ impl Writer {
                 }
                 Deed::Then(act) => then.push(act),
                 Deed::Forget(job) => over.push(job),
+                Deed::Renew(entries) => self.retry(|journal| journal.renew(&entries)),
             }
         }
         self.retry(Journal::sync);

@@ -60,6 +60,8 @@ pub enum Input {
     Ping(oneshot::Sender<()>),
     /// The rest of the program has an event for the core.
     Event(Event),
+    /// It is time to shorten the journal, if it is long and nothing goes on.
+    Rest,
     /// A client hands in a job whose assets are all here.
     Submit {
         /// The job.
@@ -73,6 +75,13 @@ pub enum Input {
     },
     /// All that was said of a submitted job is on disk.
     Taken(JobId),
+    /// A job that is over goes: nobody is told of it from now on.
+    Delete {
+        /// The job.
+        job: JobId,
+        /// Whether it may go.
+        reply: oneshot::Sender<Result<(), String>>,
+    },
     /// A client ends a job.
     Cancel {
         /// The job.

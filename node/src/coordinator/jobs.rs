@@ -1,11 +1,6 @@
 //! Jobs in the hands of the core's task: they are taken, their files are written, the disk holds them up, they end.
 
-use std::{
-    collections::BTreeMap,
-    sync::Arc,
-    thread,
-    time::{Instant, SystemTime, UNIX_EPOCH},
-};
+use std::{collections::BTreeMap, sync::Arc, thread, time::Instant};
 
 use tokio::sync::oneshot;
 
@@ -13,13 +8,15 @@ use super::{
     assemble::{self, Assembly, Refusal},
     core::Core,
     input::Input,
-    store::StoredJob,
+    kept::{End, seconds_now},
+    status,
+    store::{Store, StoredJob},
     submission,
 };
 use crate::{
-    farm::{Event, JobId, Outcome},
+    farm::{Event, JobId, JobSnapshot, Outcome},
     job::JobDescription,
-    limits::DISK_RETRY,
+    limits::{DISK_RETRY, JOURNAL_EVENTS, JOURNAL_REST},
 };
 
 /// Clients that wait to hear that their job is taken.
@@ -41,6 +38,16 @@ impl Known {
         let film = &stored.description.frame.film;
         Self { size: (film.width, film.height), stored: Some(Arc::new(stored)), trouble: None }
     }
+
+    /// A job of an earlier start, unless it was deleted. One that is over, or can be read no more, has its size alone.
+    pub fn again(store: &Store, job: &JobSnapshot) -> Option<Self> {
+        let card = store.card(job.id);
+        if job.outcome.is_some() {
+            return Some(Self { size: card.ok()?.size, stored: None, trouble: None });
+        }
+        let unread = Self { size: card.map_or((0, 0), |card| card.size), stored: None, trouble: None };
+        Some(store.get_job(job.id).map_or(unread, Self::new))
+    }
 }
 
 impl Core {
@@ -57,7 +64,7 @@ impl Core {
         let job = self.shared.store.next_job().map_err(|error| words(&error))?;
         let frame = postcard::to_stdvec(&description.frame).map_err(|error| words(&error))?;
         let frame = self.shared.store.put(&frame).map_err(|error| words(&error))?;
-        let submitted = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_secs();
+        let submitted = seconds_now();
         let spec = submission::spec(&description, min_nodes);
         let stored = StoredJob { description, frame, submitted };
         self.shared.store.put_job(job, &stored, owner).map_err(|error| words(&error))?;
@@ -102,12 +109,48 @@ impl Core {
     }
 
     pub(super) fn ended(&mut self, job: JobId, outcome: &Outcome) {
+        self.last_end = Instant::now();
         if let Some(record) = self.farm.record(job) {
             self.shared.metrics.ended(outcome, &record);
         }
         if let Some(known) = self.jobs.get_mut(&job) {
             (known.stored, known.trouble) = (None, None);
         }
+        let farm = self.farm.jobs();
+        // What the farm has forgotten is forgotten here too.
+        self.jobs.retain(|id, _| farm.iter().any(|known| known.id == *id));
+        let Some(state) = farm.iter().find(|known| known.id == job).map(status::state_of) else { return };
+        let store = self.shared.store.clone();
+        self.disk.then(move || {
+            if let Err(error) = store.put_end(job, &End::now(state)) {
+                tracing::warn!(job = job.0, %error, "the end of a job could not be noted: it is kept until the next start");
+            }
+        });
+    }
+
+    /// Begins a long journal anew while nothing goes on. The farm forgets jobs that are over; the store knows them still.
+    pub(super) fn rest(&mut self) {
+        if self.last_end.elapsed() < JOURNAL_REST || self.shared.metrics.journal_events.get() <= JOURNAL_EVENTS {
+            return;
+        }
+        if let Some(farm) = self.disk.renew(&self.farm) {
+            self.farm = farm;
+            self.changed = true;
+        }
+    }
+
+    /// Whether a job may be deleted; then nobody is told of it from now on.
+    pub(super) fn delete(&mut self, job: JobId) -> Result<(), String> {
+        if self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none()) {
+            return Err(format!("job {0} waits or runs: `tessera cancel {0}` ends it", job.0));
+        }
+        if self.shared.store.end(job).is_err() {
+            return Err(format!("there is no job {} that is over, or its end is not on disk yet", job.0));
+        }
+        tracing::info!(job = job.0, "a job is deleted");
+        self.jobs.remove(&job);
+        self.changed = true;
+        Ok(())
     }
 
     pub(super) fn assemble(&mut self, job: JobId) {

@@ -9,10 +9,12 @@ mod housekeeping;
 mod input;
 mod jobs;
 mod join;
+mod kept;
 mod leases;
 mod policy;
 mod register;
 mod requests;
+mod retention;
 mod revoked;
 mod session;
 mod status;
@@ -27,7 +29,7 @@ use tokio::{
     task::JoinHandle,
 };
 
-pub use self::assemble::write_pictures;
+pub use self::{assemble::write_pictures, retention::Retention};
 use self::{
     canary::Canary,
     core::Core,
@@ -67,6 +69,8 @@ pub struct Options {
     pub farm: FarmConfig,
     /// Bytes that stay free on its disk.
     pub free_bytes: u64,
+    /// What is kept of jobs that are over.
+    pub retention: Retention,
 }
 
 /// What every connection needs.
@@ -153,7 +157,7 @@ impl Coordinator {
             metrics: metrics.clone(),
         };
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
-        let keeping = tokio::spawn(housekeeping::keep(shared.clone()));
+        let keeping = tokio::spawn(housekeeping::keep(shared.clone(), options.retention));
         let following = tokio::spawn(revoked::follow(revoked, revocations));
         let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping, following];
         Ok(Self { address, status, metrics, page, pulse, endpoint, tasks })

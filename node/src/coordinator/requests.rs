@@ -5,13 +5,13 @@ use std::{io, path::Path};
 use quinn::{RecvStream, SendStream};
 use tokio::{io::AsyncWriteExt, sync::oneshot};
 
-use super::{Shared, gate::Guest, input::Input, submission};
+use super::{Shared, gate::Guest, housekeeping, input::Input, kept::Kept, submission};
 use crate::{
     farm::JobId,
     job::JobDescription,
     limits::{REQUEST_BYTES, RESPONSE_BYTES},
     wire::{
-        self, FileHeader, FrameError, Request, Response,
+        self, FileHeader, FrameError, JobState, KeptJob, Request, Response,
         tls::{Deed, Peer},
     },
 };
@@ -48,6 +48,17 @@ async fn answer(shared: &Shared, client: &Peer, mut send: SendStream, mut receiv
             let status = shared.status.borrow().as_ref().clone();
             say(&mut send, &Response::Status(status)).await?;
         }
+        Request::List => {
+            let listed = list(shared).await;
+            say(&mut send, &listed.map_or_else(|reason| Response::Refused { reason }, Response::Jobs)).await?;
+        }
+        Request::Delete { job } => {
+            let deleted = housekeeping::delete(shared, job).await;
+            if deleted.is_ok() {
+                housekeeping::drop_assets(shared).await;
+            }
+            say(&mut send, &deleted.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
+        }
         Request::Watch { job } => watch(shared, job, &mut send).await?,
         Request::Fetch { job } => fetch(shared, job, &mut send).await?,
         Request::Cancel { job } => {
@@ -65,9 +76,10 @@ async fn answer(shared: &Shared, client: &Peer, mut send: SendStream, mut receiv
 fn permit(shared: &Shared, client: &Peer, request: &Request) -> Result<(), String> {
     let (deed, job) = match request {
         Request::Submit { .. } => (Deed::Submit, None),
-        Request::Status | Request::Watch { .. } => (Deed::Look, None),
+        Request::Status | Request::List | Request::Watch { .. } => (Deed::Look, None),
         Request::Fetch { job } => (Deed::Fetch, Some(*job)),
         Request::Cancel { job } => (Deed::Cancel, Some(*job)),
+        Request::Delete { job } => (Deed::Delete, Some(*job)),
     };
     let owner = job.and_then(|job| shared.store.owner(job));
     if client.role.may(deed, owner.as_ref() == Some(&client.name)) {
@@ -93,6 +105,8 @@ async fn submit(
     send: &mut SendStream,
     receive: &mut RecvStream,
 ) -> Result<(), FrameError> {
+    let submitting = shared.store.submitting.clone();
+    let _taking = submitting.read().await;
     if let Err(reason) = may_submit(shared, &description).await {
         return say(send, &Response::Refused { reason }).await;
     }
@@ -117,13 +131,31 @@ async fn may_submit(shared: &Shared, description: &JobDescription) -> Result<(),
     tokio::task::spawn_blocking(move || store.room_for(pixels)).await.map_err(|error| error.to_string())?
 }
 
+/// All jobs that are kept, those that wait and run among them.
+async fn list(shared: &Shared) -> Result<Vec<KeptJob>, String> {
+    let (store, status) = (shared.store.clone(), shared.status.borrow().clone());
+    let kept = tokio::task::spawn_blocking(move || store.kept()).await.map_err(|error| error.to_string())?;
+    let listed = |kept: Kept| {
+        let live = status.jobs.iter().find(|job| job.job == kept.job).map(|job| job.state.clone());
+        let state = kept.end.map(|end| end.state).or(live).unwrap_or(JobState::Waiting);
+        KeptJob { job: kept.job, name: kept.card.name, submitted: kept.card.submitted, state, bytes: kept.bytes }
+    };
+    kept.map(|kept| kept.into_iter().map(listed).collect()).map_err(|error| error.to_string())
+}
+
 async fn watch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(), FrameError> {
     let mut status = shared.status.clone();
     let mut last = None;
     loop {
         let now = status.borrow_and_update().clone();
         let Some(found) = now.jobs.iter().find(|found| found.job == job) else {
-            return say(send, &Response::Refused { reason: format!("there is no job {}", job.0) }).await;
+            return say(
+                send,
+                &Response::Refused {
+                    reason: format!("there is no job {} that waits, runs or has just ended; `tessera list` shows what is kept", job.0),
+                },
+            )
+            .await;
         };
         if last.as_ref() != Some(&(found.clone(), now.nodes.clone())) {
             last = Some((found.clone(), now.nodes.clone()));
@@ -137,7 +169,7 @@ async fn watch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(),
 
 async fn fetch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(), FrameError> {
     let folder = shared.store.files(job);
-    let files = match list(&folder) {
+    let files = match files(&folder) {
         Ok(files) if !files.is_empty() => files,
         _ => {
             return say(
@@ -147,15 +179,19 @@ async fn fetch(shared: &Shared, job: JobId, send: &mut SendStream) -> Result<(),
             .await;
         }
     };
-    say(send, &Response::Files(files.clone())).await?;
-    for header in files {
-        let mut file = tokio::fs::File::open(folder.join(&header.name)).await?;
+    // Open files stay whole, whoever deletes the job meanwhile.
+    let mut open = Vec::new();
+    for header in &files {
+        open.push(tokio::fs::File::open(folder.join(&header.name)).await?);
+    }
+    say(send, &Response::Files(files)).await?;
+    for mut file in open {
         tokio::io::copy(&mut file, send).await?;
     }
     Ok(send.flush().await?)
 }
 
-fn list(folder: &Path) -> io::Result<Vec<FileHeader>> {
+fn files(folder: &Path) -> io::Result<Vec<FileHeader>> {
     let mut files = Vec::new();
     for entry in folder.read_dir()? {
         let entry = entry?;

@@ -54,6 +54,11 @@ fn job(job: JobSnapshot, trouble: Option<String>, times: &mut BTreeMap<JobId, Ti
     }
 }
 
+/// Where a job stands.
+pub fn state_of(job: &JobSnapshot) -> JobState {
+    state(job.phase, job.outcome.clone())
+}
+
 fn state(phase: JobPhase, outcome: Option<Outcome>) -> JobState {
     match (phase, outcome) {
         (_, Some(Outcome::Finished)) => JobState::Finished,

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! assets/HEX             an asset, or a frame's description
-//! jobs/NUMBER/job        the job's description
+//! jobs/NUMBER/job        the job's description; the job in short stands beside it (see `kept`)
 //! jobs/NUMBER/owner      the name of who submitted it
 //! jobs/NUMBER/files/...  its output files
 //! ```
@@ -10,12 +10,17 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
+    sync::Arc,
 };
 
 use serde::{Deserialize, Serialize};
 use tessera_engine::{description::AssetId, output::write_atomically};
-use tokio::io::{AsyncRead, AsyncReadExt, AsyncWriteExt};
+use tokio::{
+    io::{AsyncRead, AsyncReadExt, AsyncWriteExt},
+    sync::RwLock,
+};
 
+use super::kept::Card;
 use crate::{
     farm::JobId,
     job::JobDescription,
@@ -36,9 +41,11 @@ pub struct StoredJob {
 /// The folder.
 #[derive(Clone, Debug)]
 pub struct Store {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Bytes that stay free.
     reserve: u64,
+    /// Held for reading while a job is submitted: from the first look at its assets until it is here itself.
+    pub(super) submitting: Arc<RwLock<()>>,
 }
 
 impl Store {
@@ -49,7 +56,7 @@ impl Store {
     pub fn open(folder: &Path, reserve: u64) -> io::Result<Self> {
         fs::create_dir_all(folder.join("assets"))?;
         fs::create_dir_all(folder.join("jobs"))?;
-        Ok(Self { folder: folder.to_owned(), reserve })
+        Ok(Self { folder: folder.to_owned(), reserve, submitting: Arc::default() })
     }
 
     /// Bytes that are free where the folder is.
@@ -136,7 +143,7 @@ impl Store {
     /// # Errors
     /// When the disk refuses.
     pub fn next_job(&self) -> io::Result<JobId> {
-        let mut last = 0;
+        let mut last = self.last_deleted();
         for entry in fs::read_dir(self.folder.join("jobs"))? {
             let number = entry?.file_name().to_str().and_then(|name| name.parse().ok());
             last = last.max(number.unwrap_or(0));
@@ -150,6 +157,7 @@ impl Store {
     /// When the disk refuses.
     pub fn put_job(&self, job: JobId, stored: &StoredJob, owner: &str) -> io::Result<()> {
         fs::create_dir_all(self.files(job))?;
+        self.put_card(job, &Card::of(stored))?;
         let bytes = postcard::to_stdvec(stored).map_err(io::Error::other)?;
         write_atomically(&self.job(job).join("owner"), |file| io::Write::write_all(file, owner.as_bytes())).map_err(io::Error::other)?;
         write_atomically(&self.job(job).join("job"), |file| io::Write::write_all(file, &bytes)).map_err(io::Error::other)
@@ -173,7 +181,8 @@ impl Store {
         self.job(job).join("files")
     }
 
-    fn job(&self, job: JobId) -> PathBuf {
+    /// The folder of a job.
+    pub(super) fn job(&self, job: JobId) -> PathBuf {
         self.folder.join("jobs").join(job.0.to_string())
     }
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use super::{ScriptBundle, context::read_bounded};
+use super::{ScriptBundle, context::read_bounded, keys::nearest};
 use crate::limits;
 
 /// A folder that holds one of these is the root of a project.
@@ -101,12 +101,25 @@ pub fn real(path: &Path) -> Result<PathBuf, String> {
 }
 
 impl Disk {
+    /// The name of a module that is there and is nearly called so.
+    fn nearest(&self, module: &str) -> Option<String> {
+        let (group, _) = module.rsplit_once('.').map_or(("", module), |(group, name)| (group, name));
+        let folders = self.search.iter().map(|folder| folder.join(group.replace('.', "/")));
+        let files =
+            folders.filter_map(|folder| folder.read_dir().ok()).flatten().flatten().take(limits::SCRIPT_MODULES).map(|entry| entry.path());
+        let lua = files.filter(|path| path.extension().is_some_and(|ending| ending == "lua" || ending == "luau"));
+        let stems = lua.filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()));
+        let names: Vec<String> = stems.map(|stem| if group.is_empty() { stem } else { format!("{group}.{stem}") }).collect();
+        nearest(module, names.iter().map(String::as_str).chain(["tessera"])).map(str::to_owned)
+    }
+
     fn locate(&self, module: &str) -> Result<PathBuf, String> {
         let relative = module.replace('.', "/");
         let candidates = || self.search.iter().flat_map(|folder| ["lua", "luau"].map(|ending| folder.join(format!("{relative}.{ending}"))));
         let found = candidates().find(|path| path.is_file()).ok_or_else(|| {
             let tried: Vec<_> = candidates().filter(|path| path.extension().is_some_and(|e| e == "lua")).map(|path| shown(&path)).collect();
-            format!("no module {module:?} (looked for {})", tried.join(", "))
+            let hint = self.nearest(module).map_or(String::new(), |near| format!("; did you mean {near:?}?"));
+            format!("no module {module:?}{hint} (looked for {})", tried.join(", "))
         })?;
         let real = real(&found)?;
         if real.starts_with(self.root()) { Ok(real) } else { Err(format!("module {module:?} lies outside the project")) }

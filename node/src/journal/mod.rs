@@ -7,6 +7,7 @@
 //! pixels. Pixels stand in segments, append-only files of checksummed records; a torn tail is cut off when a segment is opened.
 
 mod filter;
+mod renew;
 mod segment;
 
 use std::collections::BTreeMap;
@@ -17,6 +18,7 @@ use std::time::Duration;
 use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
 
 pub use filter::Filter;
+pub use renew::renewed;
 use segment::Segment;
 
 use crate::error::{Error, ExitCode, Result};
@@ -68,9 +70,9 @@ impl Journal {
             journal.clear().map_err(|error| failed(&path, "shorten the journal", &*error))?;
             farm = Farm::new(config);
         }
-        for job in farm.jobs().iter().filter(|job| job.outcome.is_none()) {
-            journal.segment(job.id)?;
-        }
+        let open: Vec<JobId> = farm.jobs().iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
+        journal.drop_pixels_but_of(&open)?;
+        open.into_iter().try_for_each(|job| journal.segment(job).map(drop))?;
         Ok((journal, Recovered { farm, events }))
     }
 
@@ -109,7 +111,7 @@ impl Journal {
         if self.pending.is_empty() {
             return Ok(());
         }
-        self.write().map_err(|error| failed(&self.folder, "write the journal", &*error))?;
+        self.write(self.next, &self.pending, false).map_err(|error| failed(&self.folder, "write the journal", &*error))?;
         self.next += self.pending.len() as u64;
         self.pending.clear();
         Ok(())
@@ -119,6 +121,37 @@ impl Journal {
     pub fn size(&self) -> (u64, u64) {
         let bytes = std::fs::metadata(self.folder.join("events.redb")).map_or(0, |file| file.len());
         (self.next, bytes)
+    }
+
+    /// Puts these events, made by [`renewed`], in place of all that were appended: at once or not at all.
+    ///
+    /// # Errors
+    /// When the disk is full or fails; nothing is lost by trying again.
+    pub fn renew(&mut self, entries: &[(Duration, Event)]) -> Result<()> {
+        self.sync()?;
+        let path = self.folder.join("events.redb");
+        let replaced = self.write(0, entries, true);
+        replaced.map_err(|error| failed(&path, "shorten the journal", &*error))?;
+        self.next = entries.len() as u64;
+        // The room is taken again by later events where it cannot be given back now.
+        if let Err(error) = self.database.compact() {
+            tracing::warn!(%error, "the journal keeps its length on disk");
+        }
+        Ok(())
+    }
+
+    /// Removes pixels that a crash left of jobs that are over.
+    fn drop_pixels_but_of(&self, open: &[JobId]) -> Result<()> {
+        let unreadable = |error: io::Error| failed(&self.folder, "list pixels", &error);
+        for entry in std::fs::read_dir(&self.folder).map_err(unreadable)? {
+            let path = entry.map_err(unreadable)?.path();
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let job = name.strip_prefix("job-").and_then(|name| name.strip_suffix(".pixels")).and_then(|number| number.parse().ok());
+            if job.is_some_and(|job| !open.contains(&JobId(job))) {
+                std::fs::remove_file(&path).map_err(|error| failed(&path, "remove pixels", &error))?;
+            }
+        }
+        Ok(())
     }
 
     /// Begins anew: nothing in the journal is needed any more.
@@ -131,11 +164,14 @@ impl Journal {
         Ok(())
     }
 
-    fn write(&self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    fn write(&self, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let writing = self.database.begin_write()?;
+        if anew {
+            writing.delete_table(EVENTS)?;
+        }
         {
             let mut table = writing.open_table(EVENTS)?;
-            for (number, (at, event)) in (self.next..).zip(&self.pending) {
+            for (number, (at, event)) in (first..).zip(entries) {
                 table.insert(number, (u64::try_from(at.as_nanos())?, postcard::to_stdvec(event)?.as_slice()))?;
             }
         }

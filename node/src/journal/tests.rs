@@ -1,5 +1,5 @@
 use super::*;
-use crate::farm::{Command, Incarnation, JobSpec, NodeInfo, ToNode};
+use crate::farm::{Command, Incarnation, JobSpec, NodeInfo, NodeState, ToNode};
 use crate::schedule::{Assign, CostMap, NodeId, Probe, Split};
 
 fn spec() -> JobSpec {
@@ -165,4 +165,69 @@ fn pixels_on_disk_are_not_rendered_again_after_a_crash_before_their_commit() {
         commands.iter().filter(|command| matches!(command, Command::Send { message: ToNode::Render { .. }, .. })).count()
     };
     assert_eq!((orders(&mut farm), orders(&mut kept)), (16, 15));
+}
+
+/// A journal that is begun anew while nodes are there brings back the very farm that goes on, whatever happens next.
+#[test]
+fn a_renewed_journal_goes_on_as_the_farm_does() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut journal, recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    let (mut farm, mut filter) = (recovered.farm, Filter::default());
+    let mut takes = |journal: &mut Journal, farm: &mut Farm, at: u64, event: Event| {
+        let at = Duration::from_secs(at);
+        journal.append(filter.admit(farm, at, &event));
+        farm.step(at, event);
+    };
+    let life = life();
+    assert!(life.iter().all(|(at, _)| *at < Duration::from_secs(5)));
+    for (_, event) in life {
+        takes(&mut journal, &mut farm, 5, event);
+    }
+    assert!(renewed(&farm, FarmConfig::default()).is_none(), "a job runs");
+    takes(&mut journal, &mut farm, 6, Event::JobCancelled { job: JobId(1), reason: "enough".into() });
+    let left = |node: u32| Event::NodeLeft { node: NodeId(node), incarnation: Incarnation(9), reason: "bye".into() };
+    let info = NodeInfo { name: "second".into(), lanes: 1, build: "b".into(), address: "a".into() };
+    takes(&mut journal, &mut farm, 6, Event::NodeJoined { node: NodeId(1), incarnation: Incarnation(9), info });
+    assert!(renewed(&farm, FarmConfig::default()).is_none(), "a node has not proved itself yet");
+    takes(&mut journal, &mut farm, 6, left(1));
+    journal.sync().unwrap();
+    let before = journal.size();
+
+    let (mut farm, entries) = renewed(&farm, FarmConfig::default()).unwrap();
+    journal.renew(&entries).unwrap();
+    assert!(journal.size().0 < before.0);
+    assert_eq!(farm.nodes().iter().map(|node| node.state).collect::<Vec<_>>(), [NodeState::Ready, NodeState::Lost]);
+
+    // The ready node goes on in the same life: it renders the next job without joining again.
+    let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(2));
+    takes(&mut journal, &mut farm, 7, Event::JobSubmitted { job, spec: spec() });
+    takes(&mut journal, &mut farm, 8, Event::Prepared { node, incarnation, job, result: Ok(()) });
+    let lease =
+        farm.record(job).unwrap().parts.iter().find_map(|part| part.attempts.first().map(|attempt| LeaseId(attempt.lease))).unwrap();
+    takes(&mut journal, &mut farm, 9, Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
+    takes(&mut journal, &mut farm, 9, Event::Committed { job, lease });
+    assert_eq!(farm.jobs()[0].committed, 1);
+    journal.sync().unwrap();
+    drop(journal);
+    let (_, recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    assert_eq!(farm.difference(&recovered.farm), None);
+}
+
+#[test]
+fn pixels_that_a_crash_left_of_a_job_that_is_over_go_at_the_next_start_and_no_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut journal, _) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    for job in 1..3 {
+        journal.append(vec![(Duration::ZERO, Event::JobSubmitted { job: JobId(job), spec: spec() })]);
+    }
+    journal.append(vec![(Duration::ZERO, Event::JobCancelled { job: JobId(1), reason: "enough".into() })]);
+    for job in 1..4 {
+        journal.store_pixels(JobId(job), PartId(0), LeaseId(1), b"pixels").unwrap();
+    }
+    journal.sync().unwrap();
+    drop(journal);
+    let (mut journal, _) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    let left: Vec<bool> = (1..4).map(|job| folder.path().join(format!("job-{job}.pixels")).exists()).collect();
+    assert_eq!(left, [false, true, false]);
+    assert_eq!(journal.read_pixels(JobId(2), LeaseId(1)).unwrap(), b"pixels");
 }

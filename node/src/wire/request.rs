@@ -37,6 +37,13 @@ pub enum Request {
         /// The job.
         job: JobId,
     },
+    /// Say which jobs are kept: [`Response::Jobs`].
+    List,
+    /// Delete a job that is over, and what only it needs: [`Response::Done`].
+    Delete {
+        /// The job.
+        job: JobId,
+    },
 }
 
 /// The coordinator's answers.
@@ -67,6 +74,23 @@ pub enum Response {
         /// Why.
         reason: String,
     },
+    /// Jobs that are kept, oldest first.
+    Jobs(Vec<KeptJob>),
+}
+
+/// A job that is kept.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeptJob {
+    /// Its number.
+    pub job: JobId,
+    /// Its name.
+    pub name: String,
+    /// Moment of submission, in seconds since 1970.
+    pub submitted: u64,
+    /// Where it stands, or how it ended.
+    pub state: JobState,
+    /// Bytes of its files and its description on the coordinator's disk; assets may serve several jobs, and are not among them.
+    pub bytes: u64,
 }
 
 /// A file that follows.

@@ -30,6 +30,8 @@ pub enum Deed {
     Fetch,
     /// To end a job.
     Cancel,
+    /// To remove a job that is over.
+    Delete,
 }
 
 impl fmt::Display for Role {
@@ -51,6 +53,7 @@ impl fmt::Display for Deed {
             Self::Submit => "submit jobs",
             Self::Fetch => "fetch files of jobs",
             Self::Cancel => "cancel jobs",
+            Self::Delete => "delete jobs",
         })
     }
 }
@@ -69,7 +72,7 @@ impl Role {
     pub fn may(self, deed: Deed, own: bool) -> bool {
         match (self, deed) {
             (Self::Operator, _) | (Self::Submitter | Self::Observer, Deed::Look) | (Self::Submitter, Deed::Submit) => true,
-            (Self::Submitter, Deed::Fetch | Deed::Cancel) => own,
+            (Self::Submitter, Deed::Fetch | Deed::Cancel | Deed::Delete) => own,
             (Self::Observer, _) | (Self::Node | Self::Coordinator, _) => false,
         }
     }
