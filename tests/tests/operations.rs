@@ -2,13 +2,14 @@
 
 use std::{
     fs,
-    io::{Read, Write},
+    io::{BufRead, BufReader, Read, Write},
     net::TcpStream,
+    process::{Child, Command, Stdio},
     thread,
     time::{Duration, Instant},
 };
 
-use rustix::process::Signal;
+use rustix::process::{Pid, Resource, Rlimit, Signal, getrlimit, prlimit};
 use serde_json::Value;
 use tessera_tests::farm::{PATIENCE, Program, Running, signal};
 
@@ -189,4 +190,61 @@ fn a_job_whose_folder_refuses_its_files_is_named_wherever_one_looks() {
     wait_for("others go on", || metric(&page, "tessera_jobs_held_up") == 0.0);
     let log = coordinator.kill().errors;
     assert_eq!(log.matches("until the disk takes its files").count(), 1, "once, not every second: {log}");
+}
+
+/// A coordinator that outlives writes beyond what it may write (and goes with the test), its address and its page.
+struct Limited(Child, String, String);
+
+impl Limited {
+    fn start(program: &Program) -> Self {
+        let arguments = ["coordinator", "--listen", "127.0.0.1:0", "--data", "data", "--keys", "keys", "--web", "127.0.0.1:0"];
+        let mut command = Command::new("sh");
+        command.args(["-c", "trap '' XFSZ; exec \"$0\" \"$@\"", BINARY]).args(arguments).current_dir(program.folder.path());
+        let mut child = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+        let mut lines = BufReader::new(child.stdout.take().unwrap()).lines().map_while(Result::ok);
+        let mut told = |start: &str| lines.find_map(|line| line.strip_prefix(start).map(str::to_owned)).unwrap();
+        let (address, page) = (told("listening on "), told("status page at http://"));
+        Self(child, address, page.trim_end_matches('/').to_owned())
+    }
+
+    /// Its files may grow to so many bytes; `None`: as far as there is room.
+    fn may_write(&self, bytes: Option<u64>) {
+        let pid = Pid::from_raw(i32::try_from(self.0.id()).unwrap());
+        let maximum = getrlimit(Resource::Fsize).maximum;
+        prlimit(pid, Resource::Fsize, Rlimit { current: bytes.or(maximum), maximum }).unwrap();
+    }
+}
+
+impl Drop for Limited {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// What the disk refuses for a while is written when it takes it again: by the same process, and nothing is missing at the next start.
+#[test]
+fn a_disk_that_was_full_for_a_while_loses_nothing() {
+    let program = Program::new(BINARY);
+    program.make_keys("keys", &["attic"]);
+    let coordinator = Limited::start(&program);
+    let (address, page) = (coordinator.1.clone(), coordinator.2.clone());
+    let access = ["--coordinator", &address, "--keys", "keys"];
+    let run = |arguments: &[&str]| program.run(&[arguments, &access].concat());
+    coordinator.may_write(Some(1));
+    let _node = program.node(&address, "keys/node-attic.pem");
+    wait_for("the journal is refused", || get(&page, "/readyz").0.starts_with("HTTP/1.1 503"));
+    let refused = run(&["submit", "job.lua"]);
+    assert_eq!(refused.code, Some(5), "{}", refused.errors);
+    assert!(refused.errors.contains("cannot write the journal"), "{}", refused.errors);
+    thread::sleep(Duration::from_millis(2500)); // it tries again, in vain
+    assert!(metric(&page, "tessera_disk_refusals_total") >= 2.0);
+    coordinator.may_write(None);
+    wait_for("it goes on by itself", || get(&page, "/readyz").0.starts_with("HTTP/1.1 200"));
+    let rendered = run(&["render", "job.lua", "-o", "out", "-q", "--set", "samples=1"]);
+    assert_eq!(rendered.code, Some(0), "{}", rendered.errors);
+    drop(coordinator);
+    let (_coordinator, _) = program.coordinator_at(&address, "keys", &[]);
+    let status = program.wait_for_status(&address, "keys", |status| status["nodes"][0]["state"] == "ready");
+    assert_eq!((status["jobs"][0]["state"].as_str(), status["nodes"][0]["name"].as_str()), (Some("finished"), Some("attic")));
 }

@@ -31,7 +31,8 @@ const EVENTS: TableDefinition<u64, (u64, &[u8])> = TableDefinition::new("events"
 
 /// The journal of one coordinator, in a folder of its own.
 pub struct Journal {
-    database: Database,
+    /// None after the disk refused something: a database takes nothing any more until it is opened again.
+    database: Option<Database>,
     next: u64,
     pending: Vec<(Duration, Event)>,
     pixels: BTreeMap<JobId, Segment>,
@@ -62,7 +63,8 @@ impl Journal {
                 .with_help("end that one, or choose another folder with --data"),
             error => failed(&path, "open the journal", &error),
         })?;
-        let mut journal = Self { database, next: 0, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
+        let mut journal =
+            Self { database: Some(database), next: 0, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
         let mut farm = Farm::new(config.clone());
         let events = journal.replay(|at, event| _ = farm.step(at, event)).map_err(|error| failed(&path, "read the journal", &*error))?;
         journal.next = events;
@@ -76,8 +78,8 @@ impl Journal {
         Ok((journal, Recovered { farm, events }))
     }
 
-    fn replay(&self, mut take: impl FnMut(Duration, Event)) -> Result<u64, Box<dyn std::error::Error + Send + Sync>> {
-        let reading = self.database.begin_read()?;
+    fn replay(&mut self, mut take: impl FnMut(Duration, Event)) -> Result<u64, Box<dyn std::error::Error + Send + Sync>> {
+        let reading = self.database()?.begin_read()?;
         let table = match reading.open_table(EVENTS) {
             Ok(table) => table,
             Err(redb::TableError::TableDoesNotExist(_)) => return Ok(0),
@@ -111,10 +113,22 @@ impl Journal {
         if self.pending.is_empty() {
             return Ok(());
         }
-        self.write(self.next, &self.pending, false).map_err(|error| failed(&self.folder, "write the journal", &*error))?;
-        self.next += self.pending.len() as u64;
-        self.pending.clear();
+        let pending = std::mem::take(&mut self.pending);
+        if let Err(error) = self.write(self.next, &pending, false) {
+            self.pending = pending;
+            return Err(failed(&self.folder, "write the journal", &*error));
+        }
+        self.next += pending.len() as u64;
         Ok(())
+    }
+
+    /// The database, opened again where it has to be.
+    fn database(&mut self) -> Result<&mut Database, redb::DatabaseError> {
+        let database = match self.database.take() {
+            Some(database) => database,
+            None => Database::create(self.folder.join("events.redb"))?,
+        };
+        Ok(self.database.insert(database))
     }
 
     /// Events in it, and their bytes on disk.
@@ -134,7 +148,7 @@ impl Journal {
         replaced.map_err(|error| failed(&path, "shorten the journal", &*error))?;
         self.next = entries.len() as u64;
         // The room is taken again by later events where it cannot be given back now.
-        if let Err(error) = self.database.compact() {
+        if let Err(error) = self.compact() {
             tracing::warn!(%error, "the journal keeps its length on disk");
         }
         Ok(())
@@ -156,27 +170,28 @@ impl Journal {
 
     /// Begins anew: nothing in the journal is needed any more.
     fn clear(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
-        let writing = self.database.begin_write()?;
-        writing.delete_table(EVENTS)?;
-        writing.commit()?;
-        self.database.compact()?;
+        self.write(0, &[], true)?;
+        self.compact()?;
         self.next = 0;
         Ok(())
     }
 
-    fn write(&self, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
-        let writing = self.database.begin_write()?;
-        if anew {
-            writing.delete_table(EVENTS)?;
+    fn compact(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        let done = self.database()?.compact();
+        if done.is_err() {
+            self.database = None;
         }
-        {
-            let mut table = writing.open_table(EVENTS)?;
-            for (number, (at, event)) in (first..).zip(entries) {
-                table.insert(number, (u64::try_from(at.as_nanos())?, postcard::to_stdvec(event)?.as_slice()))?;
-            }
-        }
-        writing.commit()?;
+        done?;
         Ok(())
+    }
+
+    /// Writes entries from the number `first` on, whole or not at all. Writing them again changes nothing: where the disk failed late, they may be there.
+    fn write(&mut self, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        let written = put(self.database()?, first, entries, anew);
+        if written.is_err() {
+            self.database = None;
+        }
+        written
     }
 
     /// Appends the pixels of an attempt. They are durable after the next [`Self::sync_pixels`]; only then may the farm be told that they are committed.
@@ -241,6 +256,21 @@ impl Journal {
     fn path(&self, job: JobId) -> std::path::PathBuf {
         self.folder.join(format!("job-{}.pixels", job.0))
     }
+}
+
+fn put(database: &Database, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    let writing = database.begin_write()?;
+    if anew {
+        writing.delete_table(EVENTS)?;
+    }
+    {
+        let mut table = writing.open_table(EVENTS)?;
+        for (number, (at, event)) in (first..).zip(entries) {
+            table.insert(number, (u64::try_from(at.as_nanos())?, postcard::to_stdvec(event)?.as_slice()))?;
+        }
+    }
+    writing.commit()?;
+    Ok(())
 }
 
 fn failed(path: &Path, what: &str, error: &(impl std::fmt::Display + ?Sized)) -> Error {
