@@ -6,6 +6,7 @@
 //! data = "/var/lib/tessera"
 //! keys = "/etc/tessera/coordinator-coordinator.pem"
 //! web = "127.0.0.1:7180"          # the status page
+//! submitter_bytes = 68719476736   # assets and jobs of one submitter
 //! issuer = "/etc/tessera/issuer.pem"   # certifies those who join
 //! revoked = "/etc/tessera/revoked"     # list of revoked certificates
 //! no_node_timeout = 60.0          # seconds
@@ -55,6 +56,8 @@ pub struct CoordinatorConfig {
     pub keys: Option<PathBuf>,
     /// Certifies those who join: a file, or a folder that holds one.
     pub issuer: Option<PathBuf>,
+    /// Bytes that one submitter may leave there.
+    pub submitter_bytes: Option<u64>,
     /// The list of revoked certificates.
     pub revoked: Option<PathBuf>,
     /// Where the status page is served.

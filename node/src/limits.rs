@@ -182,11 +182,53 @@ pub const HANDSHAKES: usize = 256;
 /// Connections of all peers.
 pub const CONNECTIONS: usize = 24_000;
 
-/// Connections of one node: the present one, and those that broke and are not given up yet.
-pub const CONNECTIONS_PER_NODE: usize = 4;
+/// Connections of one node: the present one, those that broke and are not given up yet, and attempts of another process with its key.
+pub const CONNECTIONS_PER_NODE: usize = 8;
+
+/// How long a node's connection counts after its end.
+pub const NODE_REST: Duration = Duration::from_secs(1);
 
 /// Connections of one client's key.
 pub const CONNECTIONS_PER_CLIENT: usize = 32;
+
+/// Rendering threads of one node.
+pub const LANES: u32 = 4096;
+
+/// Bytes of a frame that is read without asking for room.
+pub const SMALL_FRAME_BYTES: usize = 64 << 10;
+
+/// Bytes of all larger frames that are read, or wait to be handled, at once: of one request at the least.
+pub const LARGE_FRAMES_BYTES: usize = 512 << 20;
+
+/// How long a peer may take with a frame or an asset, however small.
+pub const FRAME_PATIENCE: Duration = Duration::from_secs(10);
+
+/// What it has to send in each further second.
+pub const SLOWEST_BYTES_PER_SECOND: u64 = 64 << 10;
+
+/// Bytes of a reason that a peer gives; the rest is cut off.
+pub const REASON_BYTES: usize = 1 << 10;
+
+/// Requests of one client's connection at once.
+pub const REQUESTS_PER_CLIENT: u32 = 16;
+
+/// Streams that a peer may open before it is known who it is.
+pub const FIRST_STREAMS: u32 = 2;
+
+/// Signs of life that a node may give between two heartbeats; more are not handed on.
+pub const HEARTBEATS_PER_INTERVAL: u32 = 4;
+
+/// Bytes of assets and jobs that one submitter may leave with the coordinator, if it is not told otherwise.
+pub const SUBMITTER_BYTES: u64 = 64 << 30;
+
+/// Jobs of one submitter that wait or run.
+pub const JOBS_PER_SUBMITTER: usize = 200;
+
+/// What an asset counts at the least against that.
+pub const ASSET_LEAST_BYTES: u64 = 4 << 10;
+
+/// Assets of one job.
+pub const ASSETS_PER_JOB: usize = 100_000;
 
 /// Bytes that a peer may send before it is known who it is.
 pub const FIRST_WINDOW_BYTES: u32 = 256 << 10;

@@ -8,7 +8,7 @@ use std::{
 };
 
 use quinn::{Connection, Endpoint, RecvStream, SendStream};
-use tessera_engine::description::{AssetSource, MemoryAssets};
+use tessera_engine::description::{AssetId, AssetSource, MemoryAssets};
 use tokio::{
     io::AsyncWriteExt,
     time::{sleep, timeout},
@@ -92,16 +92,31 @@ impl Client {
             Response::Wanted(wanted) => wanted,
             other => return Err(self.unexpected(&other)),
         };
+        // An answer that comes before all is sent is a refusal, and ends the sending.
+        let answer = self.response(&mut receive);
+        tokio::pin!(answer);
+        let answer = tokio::select! {
+            biased;
+            answer = &mut answer => answer,
+            sent = self.send_assets(&mut send, assets, wanted) => match (sent, answer.await) {
+                (Err(error), Err(_)) => Err(error),
+                (_, answer) => answer,
+            },
+        };
+        match answer? {
+            Response::Submitted { job } => Ok(job),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    async fn send_assets(&self, send: &mut SendStream, assets: &MemoryAssets, wanted: Vec<AssetId>) -> Result<()> {
         for id in wanted {
             let bytes =
                 assets.bytes(id).ok_or_else(|| Error::new(ExitCode::Internal, format!("the job names asset {id}, which is not in it")))?;
             send.write_u64_le(bytes.len() as u64).await.map_err(|error| self.lost(error))?;
             send.write_all(&bytes).await.map_err(|error| self.lost(error))?;
         }
-        match self.response(&mut receive).await? {
-            Response::Submitted { job } => Ok(job),
-            other => Err(self.unexpected(&other)),
-        }
+        Ok(())
     }
 
     /// Follows a job to its end; `see` is told of every change.

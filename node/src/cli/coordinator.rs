@@ -16,7 +16,7 @@ use crate::{
     coordinator::{Coordinator, Options, Pulse, Retention},
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
-    limits::{FREE_BYTES, KEPT_BYTES, KEPT_FOR, NO_NODE_TIMEOUT},
+    limits::{FREE_BYTES, KEPT_BYTES, KEPT_FOR, NO_NODE_TIMEOUT, SUBMITTER_BYTES},
     supervisor::{self, Watchdog},
     web,
     wire::tls::{Authority, Identity, Role},
@@ -37,6 +37,9 @@ pub struct Args {
     /// Key with which those are certified who join with a token: a file made by `tessera keys issuer` [default: none, and nobody can join].
     #[arg(long, env = "TESSERA_ISSUER", value_name = "PATH")]
     issuer: Option<PathBuf>,
+    /// Bytes of assets and jobs that one submitter may leave here [default: 64 GiB].
+    #[arg(long, value_name = "BYTES")]
+    submitter_bytes: Option<u64>,
     /// List of revoked certificates, read again when it changes [default: `revoked` in the folder of --data].
     #[arg(long, env = "TESSERA_REVOKED", value_name = "FILE")]
     revoked: Option<PathBuf>,
@@ -62,6 +65,7 @@ pub fn run(args: Args) -> Result<()> {
         data: required(args.data.or(file.data), "--data", "coordinator.data")?,
         identity: Identity::load(&required(args.keys.or(file.keys), "--keys", "coordinator.keys")?, Role::Coordinator)?,
         issuer: args.issuer.or(file.issuer).map(|path| Authority::load_issuer(&path)).transpose()?,
+        submitter_bytes: args.submitter_bytes.or(file.submitter_bytes).unwrap_or(SUBMITTER_BYTES),
         revoked: args.revoked.or(file.revoked),
         farm: FarmConfig { no_node_timeout: seconds(no_node_timeout)?, ..FarmConfig::default() },
         free_bytes: file.free_bytes.unwrap_or(FREE_BYTES),

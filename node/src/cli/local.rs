@@ -41,6 +41,7 @@ impl LocalFarm {
             data: folder.path().join("data"),
             identity: authority.issue(Role::Coordinator, "coordinator")?,
             issuer: None,
+            submitter_bytes: u64::MAX,
             revoked: None,
             farm,
             free_bytes: 0,

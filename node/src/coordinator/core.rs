@@ -13,6 +13,7 @@ use tokio::{
 
 use super::{
     Shared,
+    asked::Asked,
     canary::Canary,
     disk::Disk,
     input::{Input, LinkId, Outgoing},
@@ -67,6 +68,7 @@ pub struct Core {
     pub(super) disk: Disk,
     pub(super) thinker: Thinker,
     pub(super) canary: Canary,
+    pub(super) asked: Asked,
     pub(super) links: BTreeMap<NodeId, Link>,
     pub(super) nodes: BTreeMap<LinkId, NodeId>,
     pub(super) ids: BTreeMap<String, NodeId>,
@@ -119,6 +121,7 @@ impl Core {
             disk,
             thinker,
             canary,
+            asked: Asked::default(),
             links: BTreeMap::new(),
             nodes: BTreeMap::new(),
             ids,
@@ -210,7 +213,7 @@ impl Core {
                 let _ = known.send(());
             }
             Input::Heard(link) => self.of(link, |_, node, incarnation| Some(Event::NodeHeard { node, incarnation })),
-            Input::Said(link, message) => self.of(link, |core, node, incarnation| core.said(node, incarnation, message)),
+            Input::Said(link, message, _room) => self.of(link, |core, node, incarnation| core.said(node, incarnation, message)),
             Input::Delivered(link, header, bytes) => {
                 self.of(link, |core, node, incarnation| core.delivered(node, incarnation, &header, bytes))
             }
@@ -240,10 +243,12 @@ impl Core {
                 }
                 self.step(event);
             }
-            Input::Submit { description, min_nodes, owner, reply } => match self.submit(*description, min_nodes, &owner) {
-                Ok(job) => self.answer_when_taken(job, reply),
-                Err(reason) => drop(reply.send(Err(reason))),
-            },
+            Input::Submit { description, min_nodes, owner, limited, reply } => {
+                match self.submit(*description, min_nodes, &owner, limited) {
+                    Ok(job) => self.answer_when_taken(job, reply),
+                    Err(reason) => drop(reply.send(Err(reason))),
+                }
+            }
             Input::Rest => self.rest(),
             Input::Taken(job) => {
                 // Whoever asked may have gone meanwhile.
@@ -291,6 +296,9 @@ impl Core {
             return;
         }
         tracing::info!(node = name, address, lanes = hello.lanes, build = hello.build, "a node joined");
+        if self.links.get(&node).is_none_or(|link| link.incarnation != incarnation) {
+            self.asked.forget_node(node);
+        }
         self.nodes.insert(id, node);
         let link = Link { id, incarnation, outgoing, address: address.clone(), heard: Instant::now(), suspected: false, dead: false };
         if self.links.insert(node, link).is_some_and(|earlier| earlier.incarnation != incarnation && !earlier.dead) {
@@ -305,6 +313,9 @@ impl Core {
     }
 
     fn said(&mut self, node: NodeId, incarnation: Incarnation, message: FromNode) -> Option<Event> {
+        if !self.asked.settles(node, &message) {
+            return Some(Event::NodeHeard { node, incarnation });
+        }
         match message {
             FromNode::Proof { hash } => {
                 let verdict = if hash == self.canary.hash {
@@ -317,6 +328,9 @@ impl Core {
             }
             FromNode::Prepared { job, result } => Some(Event::Prepared { node, incarnation, job, result }),
             FromNode::Probed { job, cells } => Some(Event::Probed { node, incarnation, job, cells }),
+            FromNode::Failed { job, lease, .. } if self.shared.leases.get(job, lease).is_none_or(|lease| lease.node != node) => {
+                Some(Event::NodeHeard { node, incarnation })
+            }
             FromNode::Failed { job, lease, reason } => {
                 self.shared.leases.remove_of(node, job, lease);
                 Some(Event::RenderFailed { node, incarnation, job, lease, reason })
@@ -402,6 +416,7 @@ impl Core {
                 self.shared.leases.remove_job(job);
                 self.pixels.retain(|(other, _), _| *other != job);
                 self.thinker.forget(job);
+                self.asked.forget_job(job);
                 self.disk.forget(job);
                 self.publish();
             }
@@ -434,6 +449,7 @@ impl Core {
     }
 
     fn say(&mut self, node: NodeId, incarnation: Incarnation, message: ToNode) {
+        self.asked.note(node, &message);
         let Some(link) = self.link_of(node, incarnation) else { return };
         if link.outgoing.try_send(Outgoing::Say(message)).is_err() {
             tracing::debug!(node = node.0, "a message could not be handed to its connection");

@@ -16,7 +16,7 @@ use tokio::{
 use crate::{
     limits::{
         CLIENT_WINDOW_BYTES, CONNECT_TIMEOUT, CONNECTIONS, CONNECTIONS_PER_CLIENT, CONNECTIONS_PER_NODE, HANDSHAKES, RECEIVE_WINDOW_BYTES,
-        REFUSAL_LOG_INTERVAL, REFUSALS_LOGGED,
+        REFUSAL_LOG_INTERVAL, REFUSALS_LOGGED, REQUESTS_PER_CLIENT, STREAMS_PER_PEER,
     },
     throttle::Throttle,
     web::Metrics,
@@ -58,7 +58,13 @@ pub struct Joiner {
 #[derive(Default)]
 struct Inside {
     all: usize,
-    by_peer: BTreeMap<Peer, usize>,
+    by_peer: BTreeMap<Peer, Place>,
+}
+
+/// Connections of one peer.
+struct Place {
+    connections: usize,
+    turn: Arc<Semaphore>,
 }
 
 /// A peer that was let in, for as long as this lives.
@@ -69,6 +75,8 @@ pub struct Guest {
     pub address: SocketAddr,
     /// What it proved.
     pub certificate: Certificate,
+    /// Taken by what the peer may do one at a time over all its connections: large frames, and submissions.
+    pub turn: Arc<Semaphore>,
     inside: Arc<Mutex<Inside>>,
     revoked: watch::Receiver<Arc<Revocations>>,
 }
@@ -77,6 +85,13 @@ impl Guest {
     /// Who it is.
     pub fn peer(&self) -> &Peer {
         &self.certificate.peer
+    }
+
+    /// Makes room for all that a node sends.
+    pub fn open_wide(&self) {
+        self.connection.set_receive_window(RECEIVE_WINDOW_BYTES.into());
+        self.connection.set_max_concurrent_bi_streams(STREAMS_PER_PEER.into());
+        self.connection.set_max_concurrent_uni_streams(STREAMS_PER_PEER.into());
     }
 
     /// Waits until it is no longer welcome, closes its connection, and says why.
@@ -102,10 +117,12 @@ impl Drop for Guest {
     fn drop(&mut self) {
         let mut inside = self.inside.lock().unwrap_or_else(PoisonError::into_inner);
         inside.all = inside.all.saturating_sub(1);
-        if let Some(count) = inside.by_peer.get_mut(&self.certificate.peer) {
-            *count = count.saturating_sub(1);
+        if let Some(place) = inside.by_peer.get_mut(&self.certificate.peer) {
+            place.connections = place.connections.saturating_sub(1);
+            if place.connections == 0 {
+                inside.by_peer.remove(&self.certificate.peer);
+            }
         }
-        inside.by_peer.retain(|_, count| *count > 0);
     }
 }
 
@@ -172,13 +189,11 @@ impl Gate {
         let peer = certificate.peer.clone();
         let allowed = match peer.role {
             Role::Coordinator => return Err("a coordinator cannot connect to a coordinator".to_owned()),
-            Role::Node => {
-                connection.set_receive_window(RECEIVE_WINDOW_BYTES.into());
-                CONNECTIONS_PER_NODE
-            }
+            Role::Node => CONNECTIONS_PER_NODE,
             Role::Submitter | Role::Observer | Role::Operator => {
                 connection.set_receive_window(CLIENT_WINDOW_BYTES.into());
                 connection.set_send_window(CLIENT_WINDOW_BYTES.into());
+                connection.set_max_concurrent_bi_streams(REQUESTS_PER_CLIENT.into());
                 CONNECTIONS_PER_CLIENT
             }
         };
@@ -186,17 +201,18 @@ impl Gate {
         if inside.all >= CONNECTIONS {
             return Err(format!("there are {CONNECTIONS} connections already"));
         }
-        let count = inside.by_peer.entry(peer.clone()).or_default();
-        if *count >= allowed {
+        let place = inside.by_peer.entry(peer.clone()).or_insert_with(|| Place { connections: 0, turn: Arc::new(Semaphore::new(1)) });
+        if place.connections >= allowed {
             return Err(format!("{peer} has {allowed} connections already"));
         }
-        *count += 1;
+        place.connections += 1;
+        let turn = place.turn.clone();
         inside.all += 1;
         if let Some(warning) = soon.filter(|_| self.refusals.pass(Instant::now()).is_some()) {
             tracing::warn!(%address, warning, "renew it: tessera keys renew");
         }
         let (inside, revoked) = (self.inside.clone(), self.revoked.clone());
-        Ok(Admitted::Guest(Guest { connection: connection.clone(), address, certificate, inside, revoked }))
+        Ok(Admitted::Guest(Guest { connection: connection.clone(), address, certificate, turn, inside, revoked }))
     }
 
     /// Notes a refusal: a flood of them must not drown what else is to be said.

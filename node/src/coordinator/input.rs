@@ -4,6 +4,7 @@ use std::net::SocketAddr;
 
 use tokio::sync::{mpsc, oneshot};
 
+use super::room::Taken;
 use crate::{
     farm::{Event, JobId, LeaseId},
     job::JobDescription,
@@ -40,8 +41,8 @@ pub enum Input {
     },
     /// A node gave a sign of life.
     Heard(LinkId),
-    /// A node said something.
-    Said(LinkId, FromNode),
+    /// A node said something, which takes up room until it is handled.
+    Said(LinkId, FromNode, Taken),
     /// A node handed in a part whose pixels agree with their hash.
     Delivered(LinkId, PartHeader, Vec<u8>),
     /// A part came in damaged.
@@ -70,6 +71,8 @@ pub enum Input {
         min_nodes: u32,
         /// Who may fetch and cancel it.
         owner: String,
+        /// Whether they may have so many jobs and no more.
+        limited: bool,
         /// The job's number, or why it is refused.
         reply: oneshot::Sender<Result<JobId, String>>,
     },

@@ -16,7 +16,7 @@ use super::{
 use crate::{
     farm::{Event, JobId, JobSnapshot, Outcome},
     job::JobDescription,
-    limits::{DISK_RETRY, JOURNAL_EVENTS, JOURNAL_REST},
+    limits::{DISK_RETRY, JOBS_PER_SUBMITTER, JOURNAL_EVENTS, JOURNAL_REST},
 };
 
 /// Clients that wait to hear that their job is taken.
@@ -56,10 +56,15 @@ impl Core {
         self.disk_trouble.clone().or_else(|| self.no_space.clone())
     }
 
-    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32, owner: &str) -> Result<JobId, String> {
+    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32, owner: &str, limited: bool) -> Result<JobId, String> {
         let words = |error: &dyn std::fmt::Display| format!("the job could not be stored: {error}");
         if let Some(refusal) = self.refusal() {
             return Err(refusal);
+        }
+        let mut running = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none());
+        let own = |job: &JobSnapshot| self.shared.store.owner(job.id).as_deref() == Some(owner);
+        if limited && running.by_ref().filter(own).count() >= JOBS_PER_SUBMITTER {
+            return Err(format!("{JOBS_PER_SUBMITTER} jobs of {owner} wait or run already"));
         }
         let job = self.shared.store.next_job().map_err(|error| words(&error))?;
         let frame = postcard::to_stdvec(&description.frame).map_err(|error| words(&error))?;

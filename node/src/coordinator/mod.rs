@@ -1,5 +1,6 @@
 //! The coordinator: the shell around the farm's core. Sockets, clock, disk and policies stand here; decisions stand in [`crate::farm`].
 
+mod asked;
 mod assemble;
 mod canary;
 mod core;
@@ -12,10 +13,12 @@ mod join;
 mod kept;
 mod leases;
 mod policy;
+mod quota;
 mod register;
 mod requests;
 mod retention;
 mod revoked;
+mod room;
 mod session;
 mod status;
 mod store;
@@ -39,7 +42,9 @@ use self::{
     join::Joining,
     leases::Leases,
     policy::Thinker,
+    quota::Quota,
     register::Register,
+    room::Room,
     store::Store,
 };
 use crate::{
@@ -65,6 +70,8 @@ pub struct Options {
     pub issuer: Option<Authority>,
     /// The list of revoked certificates; `None` takes `revoked` in its folder.
     pub revoked: Option<PathBuf>,
+    /// Bytes that one submitter may leave here.
+    pub submitter_bytes: u64,
     /// Timeouts.
     pub farm: FarmConfig,
     /// Bytes that stay free on its disk.
@@ -81,6 +88,8 @@ struct Shared {
     leases: Leases,
     gate: Gate,
     joining: Joining,
+    room: Room,
+    quota: Quota,
     status: watch::Receiver<Arc<Status>>,
     /// What the status page shows; made only while somebody may look.
     page: watch::Sender<Arc<Snapshot>>,
@@ -137,6 +146,7 @@ impl Coordinator {
         let revoked = options.revoked.unwrap_or_else(|| options.data.join("revoked"));
         let revocations = revoked::open(&revoked)?;
         let joining = Joining::new(options.issuer, Register::open(&options.data)?);
+        let quota = Quota::new(&options.data, options.submitter_bytes);
         let (inputs, received) = mpsc::channel(EVENT_QUEUE);
         let metrics = Arc::new(Metrics::default());
         let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone(), metrics.clone())?;
@@ -152,6 +162,8 @@ impl Coordinator {
             leases: Leases::default(),
             gate: Gate::new(metrics.clone(), revocations.subscribe()),
             joining,
+            room: Room::new(),
+            quota,
             status: status.clone(),
             page: page.clone(),
             metrics: metrics.clone(),

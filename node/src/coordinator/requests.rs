@@ -1,18 +1,21 @@
 //! What clients ask for, and what their roles let them do.
 
-use std::{io, path::Path};
+use std::{io, path::Path, sync::Arc};
 
 use quinn::{RecvStream, SendStream};
-use tokio::{io::AsyncWriteExt, sync::oneshot};
+use tokio::{
+    io::AsyncWriteExt,
+    sync::{Semaphore, oneshot},
+};
 
 use super::{Shared, gate::Guest, housekeeping, input::Input, kept::Kept, submission};
 use crate::{
     farm::JobId,
     job::JobDescription,
-    limits::{REQUEST_BYTES, RESPONSE_BYTES},
+    limits::{ASSET_LEAST_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
     wire::{
         self, FileHeader, FrameError, JobState, KeptJob, Request, Response,
-        tls::{Deed, Peer},
+        tls::{Deed, Peer, Role},
     },
 };
 
@@ -26,24 +29,35 @@ pub async fn serve(shared: Shared, guest: Guest) {
             },
             _ = guest.turned_away() => return,
         };
-        let (shared, client) = (shared.clone(), guest.peer().clone());
+        let (shared, client, turn) = (shared.clone(), guest.peer().clone(), guest.turn.clone());
         tokio::spawn(async move {
-            if let Err(error) = answer(&shared, &client, send, receive).await {
+            if let Err(error) = answer(&shared, &client, &turn, send, receive).await {
                 tracing::info!(%client, %error, "a request was not answered to its end");
             }
         });
     }
 }
 
-async fn answer(shared: &Shared, client: &Peer, mut send: SendStream, mut receive: RecvStream) -> Result<(), FrameError> {
-    let request: Request = wire::read(&mut receive, REQUEST_BYTES).await?;
+async fn answer(
+    shared: &Shared,
+    client: &Peer,
+    turn: &Arc<Semaphore>,
+    mut send: SendStream,
+    mut receive: RecvStream,
+) -> Result<(), FrameError> {
+    let (request, room) = shared.room.read_now::<Request>(&mut receive, REQUEST_BYTES, turn).await?;
     if let Err(reason) = permit(shared, client, &request) {
         tracing::warn!(%client, reason, "a request was refused");
         say(&mut send, &Response::Denied { reason }).await?;
         return send.finish().map_err(|error| io::Error::other(error).into());
     }
     match request {
-        Request::Submit { description, min_nodes } => submit(shared, client, description, min_nodes, &mut send, &mut receive).await?,
+        Request::Submit { description, min_nodes } => {
+            // Assets may take hours: others are not to wait for them, but another submission of this client does.
+            drop(room);
+            let _turn = turn.acquire().await;
+            submit(shared, client, description, min_nodes, &mut send, &mut receive).await?;
+        }
         Request::Status => {
             let status = shared.status.borrow().as_ref().clone();
             say(&mut send, &Response::Status(status)).await?;
@@ -112,14 +126,39 @@ async fn submit(
     }
     let wanted: Vec<_> = description.assets.iter().copied().filter(|id| !shared.store.asset(*id).exists()).collect();
     say(send, &Response::Wanted(wanted.clone())).await?;
+    let limited = client.role == Role::Submitter;
+    let mut left = if limited { bytes_left(shared, &client.name).await? } else { u64::MAX };
+    // Its description is kept twice: with the job, and as the frame that nodes fetch.
+    let weight = 2 * postcard::to_stdvec(&description)?.len() as u64;
     for id in wanted {
-        if let Err(error) = shared.store.receive(id, receive).await {
-            return say(send, &Response::Refused { reason: format!("an asset could not be taken: {error}") }).await;
+        match shared.store.receive(id, receive, left.saturating_sub(weight)).await {
+            Ok(length) => {
+                let length = length.max(ASSET_LEAST_BYTES);
+                left = left.saturating_sub(length);
+                if limited {
+                    shared.quota.add(&client.name, &format!("assets/{id}"), length)?;
+                }
+            }
+            Err(error) if error.kind() == io::ErrorKind::QuotaExceeded => {
+                return say(send, &Response::Denied { reason: shared.quota.refusal(&client.name) }).await;
+            }
+            Err(error) => return say(send, &Response::Refused { reason: format!("an asset could not be taken: {error}") }).await,
         }
     }
+    if left < weight {
+        return say(send, &Response::Denied { reason: shared.quota.refusal(&client.name) }).await;
+    }
     let (reply, answer) = oneshot::channel();
-    let submitted = shared.ask(Input::Submit { description, min_nodes, owner: client.name.clone(), reply }, answer).await;
+    let submitted = shared.ask(Input::Submit { description, min_nodes, owner: client.name.clone(), limited, reply }, answer).await;
+    if let (Ok(job), true) = (&submitted, limited) {
+        shared.quota.add(&client.name, &format!("jobs/{}", job.0), weight)?;
+    }
     say(send, &submitted.map_or_else(|reason| Response::Refused { reason }, |job| Response::Submitted { job })).await
+}
+
+async fn bytes_left(shared: &Shared, owner: &str) -> io::Result<u64> {
+    let (quota, owner) = (shared.quota.clone(), owner.to_owned());
+    tokio::task::spawn_blocking(move || quota.left(&owner)).await.map_err(io::Error::other)?
 }
 
 /// Whether a job is taken: it is as it should be, and there is room for it.

@@ -1,6 +1,13 @@
 //! One connection of a node, seen from the coordinator.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::{
+    collections::BTreeSet,
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Instant,
+};
 
 use quinn::{Connection, ConnectionError, RecvStream, SendStream};
 use tessera_engine::{
@@ -10,7 +17,7 @@ use tessera_engine::{
 use tokio::{
     io::AsyncWriteExt,
     sync::{mpsc, oneshot},
-    time::timeout,
+    time::{sleep, timeout},
 };
 
 use super::{
@@ -19,8 +26,12 @@ use super::{
     input::{Input, LinkId, Outgoing},
 };
 use crate::{
-    limits::{CONNECT_TIMEOUT, CONTROL_BYTES, HELLO_BYTES, PART_BYTES, PART_HEADER_BYTES, PEER_QUEUE},
-    wire::{self, CLOSE_ANEW, FromNode, Heartbeat, Hello, NodeStream, PartHeader},
+    farm::{Incarnation, JobId, LeaseId},
+    limits::{
+        CONNECT_TIMEOUT, CONTROL_BYTES, FRAME_PATIENCE, HEARTBEAT_INTERVAL, HEARTBEATS_PER_INTERVAL, HELLO_BYTES, LANES, NODE_REST,
+        PART_BYTES, PART_HEADER_BYTES, PEER_QUEUE, REASON_BYTES,
+    },
+    wire::{self, CLOSE_ANEW, FrameError, FromNode, Heartbeat, Hello, NodeStream, PartHeader},
 };
 
 static LINKS: AtomicU64 = AtomicU64::new(0);
@@ -35,11 +46,13 @@ pub async fn serve(shared: Shared, guest: Guest) {
         Ok(Ok((hello, send, receive))) => {
             let (outgoing, messages) = mpsc::channel(PEER_QUEUE);
             let (known, taken) = oneshot::channel();
+            let incarnation = hello.incarnation;
             let joined = Input::Joined { link, name: name.clone(), hello, address, outgoing, known };
             if shared.inputs.send(joined).await.is_err() || taken.await.is_err() {
                 return;
             }
-            let reason = converse(&shared, &guest, link, send, receive, messages).await;
+            guest.open_wide();
+            let reason = converse(&shared, &guest, (link, incarnation), send, receive, messages).await;
             let left =
                 matches!(connection.close_reason(), None | Some(ConnectionError::ApplicationClosed(_) | ConnectionError::LocallyClosed));
             // Nobody is left to hear it when the coordinator itself ends.
@@ -49,13 +62,15 @@ pub async fn serve(shared: Shared, guest: Guest) {
     };
     tracing::info!(node = name, %address, reason, "a node's connection ended");
     connection.close(CLOSE_ANEW.into(), reason.as_bytes());
+    // Its place stays taken for a while: each life of a node is an entry in the journal.
+    sleep(NODE_REST).await;
 }
 
 async fn hello(connection: &Connection) -> Result<(Hello, SendStream, RecvStream), String> {
     let (send, mut receive) = connection.accept_bi().await.map_err(|error| error.to_string())?;
     match wire::read(&mut receive, HELLO_BYTES).await.map_err(|error| error.to_string())? {
-        NodeStream::Control(hello) if hello.lanes > 0 => Ok((hello, send, receive)),
-        NodeStream::Control(_) => Err("it has no lanes".to_owned()),
+        NodeStream::Control(hello) if (1..=LANES).contains(&hello.lanes) => Ok((hello, send, receive)),
+        NodeStream::Control(hello) => Err(format!("it has {} lanes; 1 to {LANES} are allowed", hello.lanes)),
         NodeStream::Asset(_) => Err("it did not say hello first".to_owned()),
     }
 }
@@ -64,7 +79,7 @@ async fn hello(connection: &Connection) -> Result<(Hello, SendStream, RecvStream
 async fn converse(
     shared: &Shared,
     guest: &Guest,
-    link: LinkId,
+    (link, incarnation): (LinkId, Incarnation),
     send: SendStream,
     receive: RecvStream,
     messages: mpsc::Receiver<Outgoing>,
@@ -72,16 +87,16 @@ async fn converse(
     let connection = &guest.connection;
     tokio::select! {
         reason = guest.turned_away() => reason,
-        reason = say(send, messages) => reason,
-        reason = listen(shared, link, receive) => reason,
+        reason = say(connection, send, messages) => reason,
+        reason = listen(shared, guest, link, receive) => reason,
         reason = hear_heartbeats(shared, link, connection) => reason,
-        reason = accept_parts(shared, link, connection) => reason,
+        reason = accept_parts(shared, (link, incarnation), connection) => reason,
         reason = serve_assets(shared, connection) => reason,
     }
 }
 
 /// Writes what waits in one go: a packet holds many messages.
-async fn say(mut send: SendStream, mut messages: mpsc::Receiver<Outgoing>) -> String {
+async fn say(connection: &Connection, mut send: SendStream, mut messages: mpsc::Receiver<Outgoing>) -> String {
     let mut waiting = Vec::new();
     while messages.recv_many(&mut waiting, 256).await > 0 {
         let mut bytes = Vec::new();
@@ -99,18 +114,21 @@ async fn say(mut send: SendStream, mut messages: mpsc::Receiver<Outgoing>) -> St
             return error.to_string();
         }
         if let Some(reason) = close {
+            // Before the streams end: the reason is to be the first that the node hears.
+            connection.close(CLOSE_ANEW.into(), reason.as_bytes());
             return reason;
         }
     }
     "another connection of this node took over".to_owned()
 }
 
-async fn listen(shared: &Shared, link: LinkId, mut receive: RecvStream) -> String {
+async fn listen(shared: &Shared, guest: &Guest, link: LinkId, mut receive: RecvStream) -> String {
     loop {
-        match wire::read(&mut receive, CONTROL_BYTES).await {
-            Ok(FromNode::Goodbye { reason }) => return reason,
-            Ok(message) => {
-                if shared.inputs.send(Input::Said(link, message)).await.is_err() {
+        let heard = shared.room.read(&mut receive, CONTROL_BYTES, &guest.turn).await;
+        match heard.map(|(message, room)| (shortened(message), room)) {
+            Ok((FromNode::Goodbye { reason }, _)) => return reason,
+            Ok((message, room)) => {
+                if shared.inputs.send(Input::Said(link, message, room)).await.is_err() {
                     return "the coordinator ends".to_owned();
                 }
             }
@@ -119,13 +137,27 @@ async fn listen(shared: &Shared, link: LinkId, mut receive: RecvStream) -> Strin
     }
 }
 
+/// Reasons are kept and shown: what a node says there is cut to a bearable length.
+fn shortened(mut message: FromNode) -> FromNode {
+    if let FromNode::Prepared { result: Err(reason), .. } | FromNode::Failed { reason, .. } | FromNode::Goodbye { reason } = &mut message {
+        reason.truncate(reason.floor_char_boundary(REASON_BYTES));
+    }
+    message
+}
+
 async fn hear_heartbeats(shared: &Shared, link: LinkId, connection: &Connection) -> String {
+    let mut last: Option<Instant> = None;
     loop {
         match connection.read_datagram().await {
             Ok(datagram) => {
                 if let Err(error) = wire::decode::<Heartbeat>(&datagram) {
                     return error.to_string();
                 }
+                // A node that beats faster gains nothing by it.
+                if last.is_some_and(|last| last.elapsed() < HEARTBEAT_INTERVAL / HEARTBEATS_PER_INTERVAL) {
+                    continue;
+                }
+                last = Some(Instant::now());
                 if shared.inputs.send(Input::Heard(link)).await.is_err() {
                     return "the coordinator ends".to_owned();
                 }
@@ -135,36 +167,61 @@ async fn hear_heartbeats(shared: &Shared, link: LinkId, connection: &Connection)
     }
 }
 
-async fn accept_parts(shared: &Shared, link: LinkId, connection: &Connection) -> String {
+/// Attempts that a connection hands in at this moment: each comes once.
+type Arriving = Arc<Mutex<BTreeSet<(JobId, LeaseId)>>>;
+
+async fn accept_parts(shared: &Shared, (link, incarnation): (LinkId, Incarnation), connection: &Connection) -> String {
+    let arriving = Arriving::default();
     loop {
         match connection.accept_uni().await {
-            Ok(stream) => drop(tokio::spawn(receive_part(shared.clone(), link, connection.clone(), stream))),
+            Ok(stream) => {
+                let from = Source { link, incarnation, arriving: arriving.clone() };
+                drop(tokio::spawn(receive_part(shared.clone(), from, connection.clone(), stream)));
+            }
             Err(error) => return error.to_string(),
         }
     }
 }
 
-async fn receive_part(shared: Shared, link: LinkId, connection: Connection, mut stream: RecvStream) {
-    match read_part(&shared, &mut stream).await {
+/// Whom a part comes from.
+struct Source {
+    link: LinkId,
+    incarnation: Incarnation,
+    arriving: Arriving,
+}
+
+async fn receive_part(shared: Shared, from: Source, connection: Connection, mut stream: RecvStream) {
+    let link = from.link;
+    match read_part(&shared, &from, &mut stream).await {
         Ok((header, Some(bytes))) => drop(shared.inputs.send(Input::Delivered(link, header, bytes)).await),
         Ok((header, None)) => drop(shared.inputs.send(Input::Damaged(link, header.job, header.lease)).await),
         Err(error) => {
-            tracing::warn!(error, "a part could not be taken");
+            if connection.close_reason().is_none() {
+                tracing::warn!(error, "a part could not be taken");
+            }
             connection.close(CLOSE_ANEW.into(), error.as_bytes());
         }
     }
 }
 
 /// A part's header and, if they are those that it announces, its pixels. Pixels of an attempt that is settled already are not read.
-async fn read_part(shared: &Shared, stream: &mut RecvStream) -> Result<(PartHeader, Option<Vec<u8>>), String> {
-    let header: PartHeader = wire::read(stream, PART_HEADER_BYTES).await.map_err(|error| error.to_string())?;
-    let Some(lease) = shared.leases.get(header.job, header.lease).filter(|lease| lease.frame == header.frame) else {
+async fn read_part(shared: &Shared, from: &Source, stream: &mut RecvStream) -> Result<(PartHeader, Option<Vec<u8>>), String> {
+    let header = timeout(FRAME_PATIENCE, wire::read::<PartHeader>(stream, PART_HEADER_BYTES)).await;
+    let header = header.map_err(|_| "a part that came too slowly")?.map_err(|error| error.to_string())?;
+    let lease = shared.leases.get(header.job, header.lease);
+    let Some(lease) = lease.filter(|lease| lease.frame == header.frame && lease.incarnation == from.incarnation) else {
         // The stream may be stopped: what it holds is not wanted.
         let _ = stream.stop(0_u8.into());
         return Ok((header, Some(Vec::new())));
     };
     let length = usize::try_from(lease.rect.area() * 12).ok().filter(|&length| length <= PART_BYTES).ok_or("a part that is too large")?;
-    let bytes = stream.read_to_end(length).await.map_err(|error| error.to_string())?;
+    let attempt = (header.job, header.lease);
+    if !from.arriving.lock().unwrap_or_else(PoisonError::into_inner).insert(attempt) {
+        return Err("the same part twice at once".to_owned());
+    }
+    let read = timeout(wire::patience(length as u64), stream.read_to_end(length)).await;
+    from.arriving.lock().unwrap_or_else(PoisonError::into_inner).remove(&attempt);
+    let bytes = read.map_err(|_| "a part that came too slowly")?.map_err(|error| error.to_string())?;
     let rect = lease.rect;
     let expected = header.hash;
     let check = move || {
@@ -185,7 +242,8 @@ async fn serve_assets(shared: &Shared, connection: &Connection) -> String {
 }
 
 async fn serve_asset(shared: Shared, connection: Connection, mut send: SendStream, mut receive: RecvStream) {
-    match wire::read(&mut receive, HELLO_BYTES).await {
+    let question = timeout(FRAME_PATIENCE, wire::read(&mut receive, HELLO_BYTES)).await;
+    match question.unwrap_or(Err(FrameError::TooSlow)) {
         Ok(NodeStream::Asset(id)) => {
             if let Err(error) = send_asset(&shared, id, &mut send).await {
                 tracing::warn!(%error, asset = %id, "an asset could not be sent");

@@ -18,13 +18,15 @@ use tessera_engine::{description::AssetId, output::write_atomically};
 use tokio::{
     io::{AsyncRead, AsyncReadExt, AsyncWriteExt},
     sync::RwLock,
+    time::timeout,
 };
 
 use super::kept::Card;
 use crate::{
     farm::JobId,
     job::JobDescription,
-    limits::{ASSET_BYTES, READ_CHUNK_BYTES},
+    limits::{ASSET_BYTES, ASSET_LEAST_BYTES, FRAME_PATIENCE, READ_CHUNK_BYTES},
+    wire::patience,
 };
 
 /// A job as it was taken.
@@ -106,15 +108,23 @@ impl Store {
         Ok(id)
     }
 
-    /// Keeps an asset as it comes: its length, then its bytes. Memory stays small however long it is.
+    /// Keeps an asset as it comes: its length, which is returned, then its bytes. Memory stays small however long it is.
     ///
     /// # Errors
-    /// When it is longer than allowed, when its bytes do not agree with its id, or when the disk refuses.
-    pub async fn receive(&self, id: AssetId, stream: &mut (impl AsyncRead + Unpin)) -> io::Result<()> {
-        let length = stream.read_u64_le().await?;
+    /// [`io::ErrorKind::QuotaExceeded`] when it is longer than `left`. When it is longer than any may be or comes too slowly, when its bytes do not agree with its id, or when the disk refuses.
+    pub async fn receive(&self, id: AssetId, stream: &mut (impl AsyncRead + Unpin), left: u64) -> io::Result<u64> {
+        let length = timeout(FRAME_PATIENCE, stream.read_u64_le()).await??;
         if length > ASSET_BYTES as u64 {
             return Err(io::Error::other(format!("an asset of {length} bytes where {ASSET_BYTES} are allowed")));
         }
+        if length.max(ASSET_LEAST_BYTES) > left {
+            return Err(io::ErrorKind::QuotaExceeded.into());
+        }
+        timeout(patience(length), self.receive_bytes(id, stream, length)).await??;
+        Ok(length)
+    }
+
+    async fn receive_bytes(&self, id: AssetId, stream: &mut (impl AsyncRead + Unpin), length: u64) -> io::Result<()> {
         let temporary = tempfile::NamedTempFile::new_in(self.folder.join("assets"))?;
         let mut file = tokio::fs::File::from_std(temporary.reopen()?);
         let mut hasher = blake3::Hasher::new();
@@ -194,7 +204,7 @@ mod tests {
     async fn receive(store: &Store, id: AssetId, bytes: &[u8]) -> io::Result<()> {
         let mut stream = (bytes.len() as u64).to_le_bytes().to_vec();
         stream.extend_from_slice(bytes);
-        store.receive(id, &mut stream.as_slice()).await
+        store.receive(id, &mut stream.as_slice(), u64::MAX).await.map(drop)
     }
 
     #[tokio::test]
@@ -203,11 +213,13 @@ mod tests {
         let store = Store::open(folder.path(), 0).unwrap();
         let bytes = vec![7; 3 * READ_CHUNK_BYTES + 5];
         let id = AssetId::of(&bytes);
-        let short = store.receive(id, &mut [&9_u64.to_le_bytes()[..], &[7; 8]].concat().as_slice()).await;
+        let short = store.receive(id, &mut [&9_u64.to_le_bytes()[..], &[7; 8]].concat().as_slice(), u64::MAX).await;
         assert_eq!(short.unwrap_err().kind(), io::ErrorKind::UnexpectedEof);
         assert!(receive(&store, id, &bytes[1..]).await.unwrap_err().to_string().contains("damaged"));
-        let endless = store.receive(id, &mut u64::MAX.to_le_bytes().as_slice()).await;
+        let endless = store.receive(id, &mut u64::MAX.to_le_bytes().as_slice(), u64::MAX).await;
         assert!(endless.unwrap_err().to_string().contains("allowed"));
+        let above = store.receive(id, &mut 5000_u64.to_le_bytes().as_slice(), 4999).await;
+        assert_eq!(above.unwrap_err().kind(), io::ErrorKind::QuotaExceeded, "said before a byte of it is read");
         assert_eq!(fs::read_dir(folder.path().join("assets")).unwrap().count(), 0, "nothing stays of what failed");
         receive(&store, id, &bytes).await.unwrap();
         assert_eq!(fs::read(store.asset(id)).unwrap(), bytes);

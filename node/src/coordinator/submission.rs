@@ -3,7 +3,7 @@
 use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
-    limits::PIXELS_PER_FRAME,
+    limits::{ASSETS_PER_JOB, PIXELS_PER_FRAME},
     wire,
 };
 
@@ -21,6 +21,9 @@ pub fn check(description: &JobDescription) -> Result<(), String> {
         if names[..i].contains(name) {
             return Err(format!("two outputs are named {name:?}"));
         }
+    }
+    if description.assets.len() > ASSETS_PER_JOB {
+        return Err(format!("{} assets; {ASSETS_PER_JOB} are allowed", description.assets.len()));
     }
     let film = &description.frame.film;
     let pixels = u64::from(film.width) * u64::from(film.height);

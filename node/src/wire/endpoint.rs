@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::{Error, ExitCode, Result},
-    limits::{FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
+    limits::{FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
 };
 
 /// The protocol of those who have a key certified, see [`super::JoinRequest`].
@@ -41,7 +41,7 @@ pub fn server(address: SocketAddr, identity: &Identity, strangers: bool) -> Resu
         .map_err(tls)?;
     crypto.alpn_protocols = vec![ALPN.to_vec(), JOIN_ALPN.to_vec()];
     let mut config = ServerConfig::with_crypto(Arc::new(QuicServerConfig::try_from(crypto).map_err(tls)?));
-    config.transport_config(transport(FIRST_WINDOW_BYTES));
+    config.transport_config(transport(FIRST_WINDOW_BYTES, (FIRST_STREAMS, 0)));
     let socket = std::net::UdpSocket::bind(address).map_err(|error| {
         Error::new(ExitCode::Farm, format!("cannot listen on {address}: {error}"))
             .with_help("another program has this port: end it, or choose another one with --listen")
@@ -77,7 +77,7 @@ fn with_identity(identity: &Identity) -> Result<rustls::ClientConfig> {
 pub(super) fn client_endpoint(mut crypto: rustls::ClientConfig, alpn: &[u8], to: SocketAddr) -> Result<Endpoint> {
     crypto.alpn_protocols = vec![alpn.to_vec()];
     let mut config = ClientConfig::new(Arc::new(QuicClientConfig::try_from(crypto).map_err(tls)?));
-    config.transport_config(transport(RECEIVE_WINDOW_BYTES));
+    config.transport_config(transport(RECEIVE_WINDOW_BYTES, (STREAMS_PER_PEER, STREAMS_PER_PEER)));
     let any = if to.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
     let socket = std::net::UdpSocket::bind(any).map_err(|error| Error::new(ExitCode::Farm, format!("no UDP socket: {error}")))?;
     let mut endpoint = endpoint(EndpointConfig::default(), None, socket)?;
@@ -143,13 +143,13 @@ impl HmacKey for ResetKey {
     }
 }
 
-fn transport(receive_window: u32) -> Arc<TransportConfig> {
+fn transport(receive_window: u32, (bidirectional, unidirectional): (u32, u32)) -> Arc<TransportConfig> {
     let mut config = TransportConfig::default();
     config
         .max_idle_timeout(IdleTimeout::try_from(IDLE_TIMEOUT).ok())
         .keep_alive_interval(Some(KEEP_ALIVE))
-        .max_concurrent_bidi_streams(VarInt::from_u32(STREAMS_PER_PEER))
-        .max_concurrent_uni_streams(VarInt::from_u32(STREAMS_PER_PEER))
+        .max_concurrent_bidi_streams(VarInt::from_u32(bidirectional))
+        .max_concurrent_uni_streams(VarInt::from_u32(unidirectional))
         .stream_receive_window(VarInt::from_u32(STREAM_WINDOW_BYTES))
         .receive_window(VarInt::from_u32(receive_window))
         .send_window(u64::from(RECEIVE_WINDOW_BYTES));

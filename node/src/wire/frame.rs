@@ -1,9 +1,11 @@
 //! Frames: a message in postcard coding behind its length (u32, little-endian). Every kind of message has a limit of its own.
 
+use std::time::Duration;
+
 use serde::{Serialize, de::DeserializeOwned};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-use super::super::limits::READ_CHUNK_BYTES;
+use crate::limits::{FRAME_PATIENCE, READ_CHUNK_BYTES, SLOWEST_BYTES_PER_SECOND};
 
 /// What is wrong with a frame; the connection that it came from is to be closed.
 #[derive(Debug, thiserror::Error)]
@@ -25,6 +27,9 @@ pub enum FrameError {
     /// A message followed by something else.
     #[error("a frame with {0} bytes after its message")]
     Trailing(usize),
+    /// It took longer than the slowest of connections would.
+    #[error("a frame that came too slowly")]
+    TooSlow,
 }
 
 /// The message that `bytes` are, all of them.
@@ -67,6 +72,11 @@ pub async fn write<T: Serialize>(stream: &mut (impl AsyncWrite + Unpin), message
 pub async fn read<T: DeserializeOwned>(stream: &mut (impl AsyncRead + Unpin), limit: usize) -> Result<T, FrameError> {
     let length = stream.read_u32_le().await?;
     decode(&read_exactly(stream, u64::from(length), limit).await?)
+}
+
+/// How long it may take a peer to send so many bytes.
+pub fn patience(length: u64) -> Duration {
+    FRAME_PATIENCE + Duration::from_secs(length / SLOWEST_BYTES_PER_SECOND)
 }
 
 /// Reads `length` bytes; memory grows with what has come, not with what was announced.

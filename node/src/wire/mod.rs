@@ -21,7 +21,7 @@ mod request;
 pub mod tls;
 
 pub use endpoint::{JOIN_ALPN, client, connect, renewer, server};
-pub use frame::{FrameError, decode, encode, read, read_exactly, write};
+pub use frame::{FrameError, decode, encode, patience, read, read_exactly, write};
 pub use join::{JoinRequest, JoinResponse, NewKey, joiner, requested_key};
 pub use message::{FromNode, Heartbeat, Hello, NodeStream, PartHeader, ToNode};
 pub use refusal::{Refusal, explain, explain_peer, peer_certificate};
