@@ -249,7 +249,11 @@ impl Core {
                     Err(reason) => drop(reply.send(Err(reason))),
                 }
             }
-            Input::Rest => self.rest(),
+            Input::Rest => {
+                // Who begins to look at the page sees soon how things stand.
+                self.changed = true;
+                self.rest();
+            }
             Input::Taken(job) => {
                 // Whoever asked may have gone meanwhile.
                 self.unanswered.remove(&job).into_iter().for_each(|reply| drop(reply.send(Ok(job))));

@@ -60,6 +60,9 @@ impl Register {
 
     /// Notes a name that somebody has a certificate for. Waits for the disk if it is new.
     pub fn see(&self, peer: &Peer) {
+        if self.0.lock().unwrap_or_else(PoisonError::into_inner).entries.names.contains(&peer.to_string()) {
+            return;
+        }
         let noted =
             self.change(
                 |entries| {

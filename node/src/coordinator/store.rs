@@ -111,7 +111,8 @@ impl Store {
     /// Keeps an asset as it comes: its length, which is returned, then its bytes. Memory stays small however long it is.
     ///
     /// # Errors
-    /// [`io::ErrorKind::QuotaExceeded`] when it is longer than `left`. When it is longer than any may be or comes too slowly, when its bytes do not agree with its id, or when the disk refuses.
+    /// [`io::ErrorKind::QuotaExceeded`] when it is longer than `left`. When it is longer than any may be or comes too slowly, when its bytes do not
+    /// agree with its id, or when the disk refuses.
     pub async fn receive(&self, id: AssetId, stream: &mut (impl AsyncRead + Unpin), left: u64) -> io::Result<u64> {
         let length = timeout(FRAME_PATIENCE, stream.read_u64_le()).await??;
         if length > ASSET_BYTES as u64 {
