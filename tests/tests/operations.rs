@@ -147,7 +147,7 @@ fn deleting_a_job_takes_nothing_from_another_that_waits_and_all_goes_with_the_la
     // The node must fetch the frame anew; the coordinator must know job 2 after a start, and nothing of job 1.
     coordinator.kill();
     let (coordinator, _) = program.coordinator_at(&address, "keys", &[]);
-    let _node = program.node(&address, "keys/node-attic.pem");
+    let node = program.node(&address, "keys/node-attic.pem");
     let watched = run(&["watch", "2", "-q"]);
     assert_eq!(watched.code, Some(0), "{}", watched.errors);
     assert_eq!(run(&["fetch", "2", "-o", "second"]).code, Some(0));
@@ -158,6 +158,8 @@ fn deleting_a_job_takes_nothing_from_another_that_waits_and_all_goes_with_the_la
     assert_eq!((jobs(&program, &address).len(), assets(&program)), (0, 0));
     let status = program.wait_for_status(&address, "keys", |status| status["jobs"].as_array().unwrap().is_empty());
     assert!(status["refusal"].is_null());
+    // Nobody is to have rendered the next job before it is cancelled.
+    node.kill();
     coordinator.kill();
     let (_coordinator, _) = program.coordinator_at(&address, "keys", &[]);
     let submitted = run(&["submit", "job.lua", "--set", "samples=1"]);
