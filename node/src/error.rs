@@ -22,6 +22,8 @@ pub enum ExitCode {
     Verify = 7,
     /// The farm does not accept this identity, or does not let it do that.
     Denied = 8,
+    /// The picture stands, but has holes: parts that no node could render.
+    Incomplete = 9,
     /// The user interrupted it (128 + SIGINT).
     Interrupted = 130,
 }

@@ -304,8 +304,29 @@ pub const POLICY_PATIENCE: Duration = SCRIPT_TIME.saturating_add(POLICY_TIMEOUT)
 /// Parts of one job at the most.
 pub const PARTS_PER_JOB: usize = 200_000;
 
-/// Nodes that may fail at a part before the job fails.
+/// Failures of a part, each on another node where there is one, after which it is cut up or left out.
 pub const FAILURES_PER_PART: usize = 3;
+
+/// Longest edge of a part that is left out of the picture rather than cut up again.
+pub const HOLE_EDGE: u32 = 8;
+
+/// Parts of a job that may be cut up or left out because they failed; one more, and the job fails.
+pub const NARROWED_PER_JOB: usize = 64;
+
+/// An attempt is overdue when it has taken so many times what was predicted ...
+pub const OVERDUE_FACTOR: f64 = 3.0;
+
+/// ... and at least this long.
+pub const OVERDUE_AFTER: Duration = Duration::from_secs(2);
+
+/// Pieces into which a running part is cut for idle lanes, at the most.
+pub const PIECES: usize = 16;
+
+/// Shortest edge of such a piece, in pixels.
+pub const PIECE_EDGE: u32 = 16;
+
+/// What cutting up costs: the way to the nodes and back.
+pub const PIECE_SECONDS: Duration = Duration::from_millis(50);
 
 /// Cells of a probe at the most; a finer probe gets larger cells.
 pub const PROBE_CELLS: u64 = 65_536;

@@ -82,6 +82,7 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@field assign? tessera.Assign|tessera.AssignFunction who renders which part
 ---@field output? tessera.Output what is written: below
 ---@field seed? number chooses the sample pattern
+---@field audit? number share of the parts that two nodes render, to compare their pixels
 
 ---What the script returns.
 ---@param keys tessera.JobKeys

@@ -42,12 +42,15 @@ pub struct Identity {
     pub seed: u64,
     /// The engine's revision.
     pub engine_revision: u32,
+    /// Rectangles that are not rendered, `[x, y, width, height]`: the picture is black there.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub holes: Vec<[u32; 4]>,
 }
 
 impl Identity {
     /// The identity of a frame that this engine rendered.
     pub fn new(hash: FrameHash, seed: u64) -> Self {
-        Self { image_hash: hash.to_string(), seed, engine_revision: REVISION }
+        Self { image_hash: hash.to_string(), seed, engine_revision: REVISION, holes: Vec::new() }
     }
 }
 

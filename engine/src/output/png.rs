@@ -12,12 +12,12 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use super::{OutputError, write_atomically};
 use crate::film::Film;
 
-/// Writes a film as PNG; `exposure` is in stops.
+/// Writes a film as PNG; `exposure` is in stops. Rectangles `[x, y, width, height]` that are not rendered become magenta.
 ///
 /// # Errors
 /// If the file cannot be written; an older one then stays as it was.
-pub fn write(path: &Path, film: &Film, exposure: f64) -> Result<(), OutputError> {
-    let coded = encode(film, exposure);
+pub fn write(path: &Path, film: &Film, holes: &[[u32; 4]], exposure: f64) -> Result<(), OutputError> {
+    let coded = encode(film, holes, exposure);
     write_atomically(path, |file| file.write_all(&coded?))
 }
 
@@ -27,14 +27,24 @@ const AFTER_HEADER: usize = 33;
 /// The chunk that says sRGB, perceptual intent: length, name, intent, checksum (PNG specification, 11.3.2.5).
 const SRGB_CHUNK: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
 
-fn encode(film: &Film, exposure: f64) -> io::Result<Vec<u8>> {
+/// No surface is as loud as this.
+const HOLE: [u8; 3] = [255, 0, 255];
+
+fn encode(film: &Film, holes: &[[u32; 4]], exposure: f64) -> io::Result<Vec<u8>> {
     let scale = libm::exp2(exposure);
     let quantizer = Quantizer::new();
-    let bytes: Vec<u8> = film.pixels().iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)).collect();
+    let mut bytes: Vec<u8> = film.pixels().iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)).collect();
+    holes.iter().for_each(|hole| mark(&mut bytes, film.width(), *hole));
     let mut coded = Vec::new();
     PngEncoder::new(&mut coded).write_image(&bytes, film.width(), film.height(), ExtendedColorType::Rgb8).map_err(io::Error::other)?;
     coded.splice(AFTER_HEADER..AFTER_HEADER, SRGB_CHUNK);
     Ok(coded)
+}
+
+fn mark(bytes: &mut [u8], width: u32, [x, y, columns, rows]: [u32; 4]) {
+    for row in bytes.chunks_exact_mut(3 * width as usize).skip(y as usize).take(rows as usize) {
+        row.chunks_exact_mut(3).skip(x as usize).take(columns as usize).for_each(|pixel| pixel.copy_from_slice(&HOLE));
+    }
 }
 
 /// Rounds linear values to the nearest of the 256 sRGB codes.
@@ -73,11 +83,17 @@ mod tests {
     #[test]
     fn colours_come_out_as_srgb_codes() {
         // 0.5 -> 188 and 0.2140 -> 127.5 are textbook values of the curve; beyond 1 is clipped.
-        let coded = encode(&film(&[[0.0, 1.0, 7.0], [0.5, 0.25, 0.0031308]]), 0.0).unwrap();
+        let coded = encode(&film(&[[0.0, 1.0, 7.0], [0.5, 0.25, 0.0031308]]), &[], 0.0).unwrap();
         let image = image::load_from_memory(&coded).unwrap().into_rgb8();
         assert_eq!(image.as_raw(), &[0, 255, 255, 188, 137, 10]);
-        let darker = encode(&film(&[[0.0, 1.0, 7.0], [1.0, 0.5, 0.0062616]]), -1.0).unwrap();
+        let darker = encode(&film(&[[0.0, 1.0, 7.0], [1.0, 0.5, 0.0062616]]), &[], -1.0).unwrap();
         assert_eq!(image::load_from_memory(&darker).unwrap().into_rgb8().as_raw(), &[0, 188, 255, 188, 137, 10]);
+    }
+
+    #[test]
+    fn holes_are_marked() {
+        let coded = encode(&film(&[[0.0; 3]; 2]), &[[1, 0, 1, 1]], 0.0).unwrap();
+        assert_eq!(image::load_from_memory(&coded).unwrap().into_rgb8().as_raw(), &[0, 0, 0, 255, 0, 255]);
     }
 
     #[test]
@@ -90,7 +106,7 @@ mod tests {
 
     #[test]
     fn the_file_says_that_it_is_srgb() {
-        let coded = encode(&film(&[[0.5; 3]]), 0.0).unwrap();
+        let coded = encode(&film(&[[0.5; 3]]), &[], 0.0).unwrap();
         assert_eq!(&coded[12..16], b"IHDR");
         assert_eq!(&coded[33..42], b"\0\0\0\x01sRGB\0");
         assert_eq!(&coded[42..46], crc32(&coded[37..42]).to_be_bytes());

@@ -206,6 +206,18 @@ impl Client {
         }
     }
 
+    /// Lets a node out of quarantine.
+    ///
+    /// # Errors
+    /// When it is in none, or the coordinator is lost.
+    pub async fn release(&self, node: String) -> Result<()> {
+        let (_send, mut receive) = self.request(&Request::Release { node }).await?;
+        match self.response(&mut receive).await? {
+            Response::Done => Ok(()),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
     /// Jobs that are kept.
     ///
     /// # Errors

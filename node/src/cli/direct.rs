@@ -20,7 +20,7 @@ use crate::{
 pub fn render(description: &JobDescription, scene: &Scene, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
     let parts = parts(description, threads)?;
     let film = here::parts(scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
-    write_pictures(description, &film, folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    write_pictures(description, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
     Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())
 }
 

@@ -19,6 +19,7 @@ mod local;
 mod node;
 mod plan;
 mod progress;
+mod release;
 mod render;
 mod report;
 mod runtime;
@@ -66,6 +67,8 @@ enum Command {
     List(list::Args),
     /// Removes a job that is over from the farm's disk.
     Delete(delete::Args),
+    /// Lets a node out of quarantine that delivered wrong pixels.
+    Release(release::Args),
     /// Runs a job script and says what would be rendered.
     Check(check::Args),
     /// The farm's authority, and the identities that it certifies.
@@ -94,6 +97,7 @@ fn run(command: Command) -> Result<()> {
         Command::Cancel(args) => cancel::run(args),
         Command::List(args) => list::run(args),
         Command::Delete(args) => delete::run(args),
+        Command::Release(args) => release::run(args),
         Command::Check(args) => check::run(args),
         Command::Keys(args) => keys::run(args),
         Command::Plan(args) => plan::run(args),

@@ -115,6 +115,7 @@ impl Progress {
             }
             match (before, node.state) {
                 (_, NodeState::Suspected) => self.say(&format!("{}: not heard of; its parts go to others", node.name)),
+                (_, NodeState::Quarantined) => self.say(&format!("{}: in quarantine: {}", node.name, node.reason)),
                 (_, NodeState::Lost) => self.say(&format!("{}: lost: {}", node.name, node.reason)),
                 (_, NodeState::Refused) => self.say(&format!("{}: gets no work: {}", node.name, node.reason)),
                 (Some(NodeState::Suspected), NodeState::Ready) => self.say(&format!("{}: heard again", node.name)),
@@ -164,5 +165,6 @@ pub fn word(state: &JobState) -> &'static str {
         JobState::Finished => "finished",
         JobState::Failed(_) => "failed",
         JobState::Cancelled(_) => "cancelled",
+        JobState::Incomplete(_) => "incomplete",
     }
 }

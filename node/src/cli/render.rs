@@ -128,8 +128,12 @@ async fn follow(client: &Client, loaded: &LoadedJob, min_nodes: u32, mut progres
     progress.submitted(job.0);
     let state = client.watch(job, |job, nodes| progress.see(job, nodes)).await?;
     progress.end();
-    outcome(state)?;
-    client.fetch(job, output).await
+    let ended = outcome(state.clone());
+    if matches!(state, JobState::Finished | JobState::Incomplete(_)) {
+        let files = client.fetch(job, output).await?;
+        return ended.map(|()| files).map_err(|error| error.with_help(format!("what there is stands in {}", output.display())));
+    }
+    ended.map(|()| Vec::new())
 }
 
 /// An error for a job that did not end well.
@@ -140,6 +144,10 @@ pub fn outcome(state: JobState) -> Result<()> {
     match state {
         JobState::Failed(reason) => Err(Error::new(ExitCode::Job, format!("the job failed: {reason}"))),
         JobState::Cancelled(reason) => Err(Error::new(ExitCode::Job, format!("the job was cancelled: {reason}"))),
+        JobState::Incomplete(holes) => Err(Error::new(
+            ExitCode::Incomplete,
+            format!("the picture is incomplete: {holes} parts could not be rendered; the manifest says which and why"),
+        )),
         _ => Ok(()),
     }
 }

@@ -91,6 +91,7 @@ fn replay(seed: u64) -> Result<()> {
 fn told(outcome: Option<&Outcome>) -> String {
     match outcome {
         Some(Outcome::Finished) => "finished".to_owned(),
+        Some(Outcome::Incomplete { holes }) => format!("finished with {holes} holes"),
         Some(Outcome::Failed { reason }) => format!("failed: {reason}"),
         Some(Outcome::Cancelled { reason }) => format!("cancelled: {reason}"),
         None => "still running".to_owned(),

@@ -58,6 +58,7 @@ fn node(node: &NodeStatus) -> Vec<String> {
         NodeState::Refused => "refused",
         NodeState::Suspected => "suspected",
         NodeState::Lost => "lost",
+        NodeState::Quarantined => "in quarantine",
     };
     let state = if node.reason.is_empty() { state.to_owned() } else { format!("{state}: {}", node.reason) };
     vec![node.name.clone(), node.lanes.to_string(), node.holds.to_string(), state, node.address.clone()]

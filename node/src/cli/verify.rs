@@ -66,7 +66,11 @@ fn manifest_beside(path: &Path) -> PathBuf {
 }
 
 fn agreed(manifest: &Manifest) -> String {
-    let pixels = format!("{} x {} pixels", manifest.image.width, manifest.image.height);
+    let holes = match manifest.image.holes.len() {
+        0 => String::new(),
+        count => format!(" with {count} holes that no node could render"),
+    };
+    let pixels = format!("{} x {} pixels{holes}", manifest.image.width, manifest.image.height);
     match manifest.image.pixel_type {
         PixelType::Float => format!("identity, {pixels}, {} parts", manifest.parts.len()),
         PixelType::Half => format!("identity, {pixels} (parts were hashed before their numbers became half floats)"),
@@ -82,6 +86,9 @@ fn disagreements(manifest: &Manifest, picture: &Picture) -> Vec<String> {
         Some(identity) => {
             if identity.image_hash != image.image_hash {
                 findings.push(format!("image_hash is {}, but should be {}", identity.image_hash, image.image_hash));
+            }
+            if identity.holes != image.holes {
+                findings.push(format!("its holes are {:?}, but should be {:?}", identity.holes, image.holes));
             }
             if identity.seed != image.seed {
                 findings.push(format!("the seed is {}, but should be {}", identity.seed, image.seed));
@@ -100,14 +107,17 @@ fn disagreements(manifest: &Manifest, picture: &Picture) -> Vec<String> {
         findings.push("pixels are not those that were rendered".to_owned());
     }
     if image.pixel_type == PixelType::Float {
-        findings.extend(manifest.parts.iter().filter_map(|part| part_disagreement(part, film)));
+        findings.extend(manifest.parts.iter().filter_map(|part| part_disagreement(part, &image.holes, film)));
     }
     findings
 }
 
-fn part_disagreement(part: &PartEntry, film: &Film) -> Option<String> {
+fn part_disagreement(part: &PartEntry, holes: &[[u32; 4]], film: &Film) -> Option<String> {
     let [x, y, width, height] = part.rect;
     let name = format!("part {} ({width} x {height} at {x}, {y})", part.id.0);
+    if !part.replaced_by.is_empty() || holes.contains(&part.rect) {
+        return None;
+    }
     let Some(promised) = &part.hash else { return Some(format!("{name} was never committed")) };
     match cut(film, Rect { x, y, width, height }) {
         Some(pixels) if hexadecimal(&pixels.hash()) == *promised => None,

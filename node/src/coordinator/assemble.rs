@@ -30,6 +30,8 @@ pub struct Assembly {
     pub record: JobRecord,
     /// Where the pixels are.
     pub parts: Vec<(PartId, Rect, LeaseId)>,
+    /// What no node could render.
+    pub holes: Vec<Rect>,
     /// Where the files go.
     pub files: PathBuf,
     /// When `record` was made.
@@ -38,8 +40,8 @@ pub struct Assembly {
 
 /// Why there are no files, in words.
 pub enum Refusal {
-    /// Pixels cannot be read back: they never will.
-    Pixels(String),
+    /// The pixels of a part cannot be read back: they never will.
+    Pixels(PartId, String),
     /// The disk refuses the files: it may have room again.
     Files(String),
 }
@@ -49,12 +51,12 @@ pub enum Refusal {
 /// # Errors
 /// Pixels that cannot be read back, or a disk that refuses.
 pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<ReportEntry, Refusal> {
-    let film = film(assembly, pixels).map_err(Refusal::Pixels)?;
+    let film = film(assembly, pixels)?;
     write_files(assembly, &film).map_err(Refusal::Files)
 }
 
 fn write_files(assembly: &Assembly, film: &Film) -> Result<ReportEntry, String> {
-    let image = write_pictures(&assembly.stored.description, film, &assembly.files)?;
+    let image = write_pictures(&assembly.stored.description, film, &assembly.holes, &assembly.files)?;
     let Assembly { job, stored, record, .. } = assembly;
     let submission = Submission {
         id: job.0,
@@ -69,22 +71,23 @@ fn write_files(assembly: &Assembly, film: &Film) -> Result<ReportEntry, String> 
     Ok(manifest.report)
 }
 
-fn film(assembly: &Assembly, pixels: &Pixels) -> Result<Film, String> {
+fn film(assembly: &Assembly, pixels: &Pixels) -> Result<Film, Refusal> {
     let size = &assembly.stored.description.frame.film;
     let mut film = Film::new(size.width, size.height);
     for (part, rect, lease) in &assembly.parts {
-        let bytes = pixels.read(assembly.job, *lease).map_err(|error| format!("part {}: {error}", part.0))?;
-        let rendered = RenderedPart::from_bytes(*rect, Counters::default(), &bytes).map_err(|error| format!("part {}: {error}", part.0))?;
-        film.place(&rendered).map_err(|error| error.to_string())?;
+        let unreadable = |error: &dyn std::fmt::Display| Refusal::Pixels(*part, error.to_string());
+        let bytes = pixels.read(assembly.job, *lease).map_err(|error| unreadable(&error))?;
+        let rendered = RenderedPart::from_bytes(*rect, Counters::default(), &bytes).map_err(|error| unreadable(&error))?;
+        film.place(&rendered).map_err(|error| unreadable(&error))?;
     }
     Ok(film)
 }
 
-/// Writes the EXR and the preview into a folder, and says what there is to know of them.
+/// Writes the EXR and the preview into a folder, and says what there is to know of them. Holes are black in the one, and marked in the other.
 ///
 /// # Errors
 /// In words, when the disk refuses.
-pub fn write_pictures(description: &JobDescription, film: &Film, folder: &std::path::Path) -> Result<ImageEntry, String> {
+pub fn write_pictures(description: &JobDescription, film: &Film, holes: &[Rect], folder: &std::path::Path) -> Result<ImageEntry, String> {
     let JobDescription { frame, output, .. } = description;
     let hash = frame.hash().map_err(|error| error.to_string())?;
     let (written, noted) = match output.pixel_type {
@@ -92,13 +95,15 @@ pub fn write_pictures(description: &JobDescription, film: &Film, folder: &std::p
         PixelType::Half => (exr::PixelType::Half, manifest::PixelType::Half),
     };
     let path = folder.join(&output.exr);
-    let clamped = exr::write(&path, film, written, &exr::Identity::new(hash, frame.seed)).map_err(|error| error.to_string())?;
+    let holes: Vec<[u32; 4]> = holes.iter().map(|hole| [hole.x, hole.y, hole.width, hole.height]).collect();
+    let identity = exr::Identity { holes: holes.clone(), ..exr::Identity::new(hash, frame.seed) };
+    let clamped = exr::write(&path, film, written, &identity).map_err(|error| error.to_string())?;
     let pixels_hash = match output.pixel_type {
         PixelType::Float => film.hash(),
         PixelType::Half => exr::read(&path).map_err(|error| error.to_string())?.film.hash(),
     };
     if let Some(name) = &output.png {
-        png::write(&folder.join(name), film, output.exposure).map_err(|error| error.to_string())?;
+        png::write(&folder.join(name), film, &holes, output.exposure).map_err(|error| error.to_string())?;
     }
     Ok(ImageEntry {
         exr: output.exr.clone(),
@@ -111,6 +116,7 @@ pub fn write_pictures(description: &JobDescription, film: &Film, folder: &std::p
         pixel_type: noted,
         pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
         clamped,
+        holes,
     })
 }
 
@@ -118,7 +124,7 @@ fn facts(description: &JobDescription, record: JobRecord) -> manifest::JobRecord
     manifest::JobRecord {
         split: split_words(&description.split),
         assign: assign_words(description.assign).to_owned(),
-        outcome: "finished".to_owned(),
+        outcome: if record.holes == 0 { "finished".to_owned() } else { format!("incomplete: {} holes", record.holes) },
         probe: record.probe,
         nodes: record.nodes,
         parts: record.parts,

@@ -259,6 +259,7 @@ impl Core {
                 self.unanswered.remove(&job).into_iter().for_each(|reply| drop(reply.send(Ok(job))));
             }
             Input::Delete { job, reply } => drop(reply.send(self.delete(job))),
+            Input::Release { node, reply } => drop(reply.send(self.release(&node))),
             Input::Cancel { job, reason, reply } => {
                 let running = self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none());
                 if running {
@@ -267,6 +268,13 @@ impl Core {
                 let _ = reply.send(if running { Ok(()) } else { Err(format!("there is no job {} that runs or waits", job.0)) });
             }
         }
+    }
+
+    fn release(&mut self, name: &str) -> std::result::Result<(), String> {
+        let held = |node: &farm::NodeSnapshot| node.name == name && node.state == farm::NodeState::Quarantined;
+        let node = self.farm.nodes().into_iter().find(held).ok_or_else(|| format!("no node {name} is in quarantine"))?;
+        self.step(Event::NodeReleased { node: node.id });
+        Ok(())
     }
 
     /// The node at the other end of a connection, if that is still the connection of this node.
@@ -341,7 +349,7 @@ impl Core {
             }
             FromNode::Cancelled { job, lease } => {
                 self.shared.leases.remove_of(node, job, lease);
-                Some(Event::NodeHeard { node, incarnation })
+                Some(Event::Stopped { node, incarnation, job, lease })
             }
             // Its connection ends with it.
             FromNode::Goodbye { .. } => None,
@@ -413,6 +421,10 @@ impl Core {
                 }
             }
             Command::Discard { job, lease, reason } => self.discard(job, lease, reason),
+            Command::Revoke { job, lease, .. } => {
+                // Its record stays in the segment until the job is over; nothing points at it.
+                self.pixels.remove(&(job, lease));
+            }
             Command::Assemble { job } => self.assemble(job),
             Command::End { job, outcome } => {
                 tracing::info!(job = job.0, ?outcome, "a job ended");

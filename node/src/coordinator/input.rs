@@ -85,6 +85,13 @@ pub enum Input {
         /// Whether it may go.
         reply: oneshot::Sender<Result<(), String>>,
     },
+    /// An operator lets a node out of quarantine.
+    Release {
+        /// Its name.
+        node: String,
+        /// Whether it was there.
+        reply: oneshot::Sender<Result<(), String>>,
+    },
     /// A client ends a job.
     Cancel {
         /// The job.

@@ -161,8 +161,8 @@ impl Core {
     pub(super) fn assemble(&mut self, job: JobId) {
         let stored = self.jobs.get(&job).and_then(|known| known.stored.clone());
         let (Some(stored), Some(record)) = (stored, self.farm.record(job)) else { return };
-        let assembly =
-            Assembly { job, stored, record, parts: self.farm.committed(job), files: self.shared.store.files(job), made: Instant::now() };
+        let (parts, holes) = (self.farm.committed(job), self.farm.holes(job));
+        let assembly = Assembly { job, stored, record, parts, holes, files: self.shared.store.files(job), made: Instant::now() };
         let (pixels, inputs, metrics) = (self.disk.pixels.clone(), self.shared.inputs.clone(), self.shared.metrics.clone());
         tokio::task::spawn_blocking(move || {
             let input = match assemble::write(&assembly, &pixels) {
@@ -170,7 +170,10 @@ impl Core {
                     metrics.finished(&report);
                     Input::Event(Event::Assembled { job, result: Ok(()) })
                 }
-                Err(Refusal::Pixels(reason)) => Input::Event(Event::Assembled { job, result: Err(reason) }),
+                Err(Refusal::Pixels(part, reason)) => {
+                    tracing::error!(job = job.0, part = part.0, reason, "pixels cannot be read back: the part is rendered again");
+                    Input::Event(Event::PixelsLost { job, part, reason })
+                }
                 Err(Refusal::Files(reason)) => {
                     metrics.disk_refusals.inc();
                     drop(inputs.blocking_send(Input::HeldUp(job, reason)));

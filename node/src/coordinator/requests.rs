@@ -75,6 +75,11 @@ async fn answer(
         }
         Request::Watch { job } => watch(shared, job, &mut send).await?,
         Request::Fetch { job } => fetch(shared, job, &mut send).await?,
+        Request::Release { node } => {
+            let (reply, answer) = oneshot::channel();
+            let done = shared.ask(Input::Release { node, reply }, answer).await;
+            say(&mut send, &done.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
+        }
         Request::Cancel { job } => {
             let (reply, answer) = oneshot::channel();
             let cancel = Input::Cancel { job, reason: format!("cancelled by {client}"), reply };
@@ -94,6 +99,7 @@ fn permit(shared: &Shared, client: &Peer, request: &Request) -> Result<(), Strin
         Request::Fetch { job } => (Deed::Fetch, Some(*job)),
         Request::Cancel { job } => (Deed::Cancel, Some(*job)),
         Request::Delete { job } => (Deed::Delete, Some(*job)),
+        Request::Release { .. } => (Deed::Release, None),
     };
     let owner = job.and_then(|job| shared.store.owner(job));
     if client.role.may(deed, owner.as_ref() == Some(&client.name)) {

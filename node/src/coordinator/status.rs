@@ -62,6 +62,7 @@ pub fn state_of(job: &JobSnapshot) -> JobState {
 fn state(phase: JobPhase, outcome: Option<Outcome>) -> JobState {
     match (phase, outcome) {
         (_, Some(Outcome::Finished)) => JobState::Finished,
+        (_, Some(Outcome::Incomplete { holes })) => JobState::Incomplete(u32::try_from(holes).unwrap_or(u32::MAX)),
         (_, Some(Outcome::Failed { reason })) => JobState::Failed(reason),
         (_, Some(Outcome::Cancelled { reason })) => JobState::Cancelled(reason),
         (JobPhase::Waiting | JobPhase::Over, None) => JobState::Waiting,

@@ -35,7 +35,7 @@ pub fn check(description: &JobDescription) -> Result<(), String> {
 
 /// What the farm's core is told.
 pub fn spec(description: &JobDescription, min_nodes: u32) -> JobSpec {
-    let JobDescription { name, frame, probe, split, assign, .. } = description;
+    let JobDescription { name, frame, probe, split, assign, audit, .. } = description;
     JobSpec {
         name: name.clone(),
         width: frame.film.width,
@@ -45,5 +45,6 @@ pub fn spec(description: &JobDescription, min_nodes: u32) -> JobSpec {
         split: split.clone(),
         assign: *assign,
         min_nodes: min_nodes.max(1),
+        audit: *audit,
     }
 }

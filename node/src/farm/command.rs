@@ -89,6 +89,8 @@ pub enum DiscardReason {
     Dead,
     /// The job is over, or there never was such an attempt.
     Unknown,
+    /// They were compared with those that are taken.
+    Compared,
 }
 
 /// How a job ended.
@@ -96,6 +98,11 @@ pub enum DiscardReason {
 pub enum Outcome {
     /// All parts are in the picture.
     Finished,
+    /// All but some parts that nobody could render.
+    Incomplete {
+        /// How many.
+        holes: usize,
+    },
     /// It could not be done.
     Failed {
         /// Why, for people.
@@ -155,6 +162,15 @@ pub enum Command {
         lease: LeaseId,
         /// Why.
         reason: DiscardReason,
+    },
+    /// Forget the pixels of an attempt that were to be, or are, on disk: they do not count any more.
+    Revoke {
+        /// The job.
+        job: JobId,
+        /// The part.
+        part: PartId,
+        /// The attempt.
+        lease: LeaseId,
     },
     /// All parts are committed: write the outputs, then say [`super::Event::Assembled`].
     Assemble {

@@ -2,7 +2,7 @@
 
 use super::job::{Job, Phase, Stage};
 use super::node::Nodes;
-use super::part::Place;
+use super::part::{PartState, Place};
 use super::turn::Turn;
 use super::{Command, Farm, JobId, JobSpec, Outcome, ToNode};
 use crate::limits::{JOBS_KEPT, JOBS_WAITING};
@@ -50,6 +50,8 @@ impl Job {
             }
         }
         self.loose.clear();
+        self.audits.clear();
+        (self.reconsider, self.next_due) = (None, None);
         self.question = None;
         self.deserted = None;
         self.log.ended = Some(turn.now);
@@ -60,14 +62,21 @@ impl Job {
     /// The output files stand, or cannot be written.
     pub fn assembled(&mut self, turn: &mut Turn, nodes: &Nodes, result: Result<(), String>) {
         if self.phase == Phase::Assembling {
-            self.end(turn, nodes, result.map_or_else(|reason| Outcome::Failed { reason }, |()| Outcome::Finished));
+            let holes = self.holes().count();
+            let whole = if holes == 0 { Outcome::Finished } else { Outcome::Incomplete { holes } };
+            self.end(turn, nodes, result.map_or_else(|reason| Outcome::Failed { reason }, |()| whole));
         }
+    }
+
+    /// Parts that nobody could render.
+    pub(super) fn holes(&self) -> impl Iterator<Item = &PartState> {
+        self.parts.iter().filter(|part| part.place == Place::Hole)
     }
 
     /// Fails a job that no node has been there for, for long.
     pub(super) fn watch_desertion(&mut self, turn: &mut Turn, nodes: &Nodes) {
         let able = |id: &NodeId| self.members.get(id).is_none_or(|member| !matches!(member.stage, Stage::Failed(_)));
-        let delivered = !self.parts.is_empty() && self.parts.len() == self.committed + self.committing.len();
+        let delivered = !self.parts.is_empty() && self.parts.len() == self.committed + self.dropped + self.committing.len();
         let wants = !matches!(self.phase, Phase::Waiting | Phase::Assembling | Phase::Over(_)) && !delivered;
         if !wants || nodes.iter().any(|(id, node)| node.is_hopeful() && able(id)) {
             self.deserted = None;
@@ -95,12 +104,9 @@ impl Job {
     pub fn restarted(&mut self, turn: &mut Turn) {
         self.question = None;
         self.deserted = None;
-        let gone: Vec<PartId> = std::mem::take(&mut self.committing).into_values().collect();
+        let gone: Vec<PartId> = self.committing.values().copied().collect();
         for part in gone {
-            if let Place::Committing(lease) = self.part(part).place {
-                self.unplace(part);
-                self.part_mut(part).lose_pixels(lease);
-            }
+            self.take_back(part, AttemptOutcome::Lost, "the coordinator was started anew");
         }
         if self.phase == Phase::Assembling {
             turn.put(Command::Assemble { job: self.id });
@@ -116,11 +122,12 @@ impl Job {
             _ => {}
         }
         let Some(member) = self.members.get(&id) else { return };
-        for lease in &member.held {
-            if let Some(of) = self.leases.get(lease) {
-                let (rect, samples) = (self.part(of.part).rect, self.all_samples());
-                turn.send(id, node, ToNode::Render { job: self.id, lease: *lease, rect, samples });
-            }
+        for lease in member.held.iter().chain(&member.hanging) {
+            let message = match self.leases.get(lease) {
+                Some(of) => ToNode::Render { job: self.id, lease: *lease, rect: self.part(of.part).rect, samples: self.all_samples() },
+                None => ToNode::Cancel { job: self.id, lease: *lease },
+            };
+            turn.send(id, node, message);
         }
     }
 }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
 use super::{Incarnation, JobId, LeaseId, PolicyId};
-use crate::schedule::{Assign, NodeId, Plan, Probe, Split};
+use crate::schedule::{Assign, NodeId, PartId, Plan, Probe, Split};
 
 /// What the core needs to know of a job; the picture itself is not its business.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -25,6 +25,8 @@ pub struct JobSpec {
     pub assign: Assign,
     /// Nodes to wait for before the probe (for at most the stated limit): 1 or more.
     pub min_nodes: u32,
+    /// Share of the parts that two nodes render, to compare their pixels: 0 to 1.
+    pub audit: f64,
 }
 
 /// What a node says of itself when it joins.
@@ -148,6 +150,31 @@ pub enum Event {
         /// The attempt.
         lease: LeaseId,
         /// Why.
+        reason: String,
+    },
+    /// A node has stopped an attempt, as it was told.
+    Stopped {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
+        /// The job.
+        job: JobId,
+        /// The attempt.
+        lease: LeaseId,
+    },
+    /// An operator lets a node out of quarantine.
+    NodeReleased {
+        /// The node.
+        node: NodeId,
+    },
+    /// Pixels that were on disk cannot be read back.
+    PixelsLost {
+        /// The job.
+        job: JobId,
+        /// The part.
+        part: PartId,
+        /// What is wrong with them.
         reason: String,
     },
     /// The pixels of an attempt are on disk.

@@ -47,6 +47,7 @@ impl Job {
             pace: 1.0,
             queue: Default::default(),
             held: Vec::new(),
+            hanging: Default::default(),
         };
         self.members.insert(id, member);
         turn.send(id, node, ToNode::Prepare { job: self.id });

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::job::{Job, Phase};
-use super::part::Place;
+use super::part::{Place, Role};
 use super::{Farm, LeaseId};
 use crate::schedule::{NodeId, PartId};
 
@@ -51,35 +51,47 @@ impl Job {
         let queued: Vec<(PartId, NodeId)> = self.members.iter().flat_map(queued).collect();
         let queue_of: BTreeMap<PartId, NodeId> = queued.iter().copied().collect();
         expect(queued.len() == queue_of.len(), "a part waits in two queues")?;
-        let (mut committed, mut leased, mut loose) = (0, 0, 0);
+        let (mut committed, mut dropped, mut leased, mut loose) = (0, 0, 0, 0);
         for part in &self.parts {
             let agrees = match part.place {
                 Place::Loose => self.loose.contains(&part.id),
                 Place::Queued(node) => queue_of.get(&part.id) == Some(&node),
                 Place::Leased(lease) => self.leases.get(&lease).is_some_and(|of| of.part == part.id),
                 Place::Committing(lease) => self.committing.get(&lease) == Some(&part.id),
-                Place::Committed(_) => true,
+                Place::Committed(_) | Place::Hole => true,
+                Place::Replaced => !part.replaced_by.is_empty(),
             };
             expect(agrees, &format!("part {} is not where the books say: {:?}", part.id.0, part.place))?;
             committed += usize::from(part.committed_by().is_some());
+            dropped += usize::from(matches!(part.place, Place::Replaced | Place::Hole));
             leased += usize::from(matches!(part.place, Place::Leased(_)));
             loose += usize::from(part.place == Place::Loose);
         }
         expect(committed == self.committed, "parts on disk are miscounted")?;
         expect(loose == self.loose.len(), "a part that has a place is called loose")?;
-        let held: usize = self.members.values().map(|member| member.held.len()).sum();
-        expect(held == leased, "nodes hold other leases than parts say")?;
-        expect(leased + committed + loose + queued.len() + self.committing.len() == self.parts.len(), "parts do not add up")
+        expect(dropped == self.dropped, "parts that are replaced or left out are miscounted")?;
+        let main = self.leases.values().filter(|lease| lease.role == Role::Main).count();
+        expect(main == leased, "nodes hold other leases than parts say")?;
+        let audited = |part: &PartId| self.part(*part).is_delivered();
+        expect(self.audits.iter().all(audited), "a part that is not delivered is to be compared")?;
+        expect(leased + committed + dropped + loose + queued.len() + self.committing.len() == self.parts.len(), "parts do not add up")
     }
 
-    /// Every lease belongs to a part that is not delivered yet, and what a node holds is its own.
+    /// Every lease does what its role says, and nodes hold exactly those that are not stray.
     fn check_leases(&self) -> Result<(), String> {
         for (id, lease) in &self.leases {
-            expect(!self.part(lease.part).is_delivered(), &format!("lease {} is open although its part is delivered", id.0))?;
+            let part = self.part(lease.part);
+            let agrees = match lease.role {
+                Role::Main => part.place == Place::Leased(*id),
+                Role::Spare => matches!(part.place, Place::Leased(_)),
+                Role::Audit => part.is_delivered() && !part.voted(lease.node),
+                Role::Stray => !part.is_settled() || part.committed_by().is_some(),
+            };
+            expect(agrees, &format!("lease {} is {:?}, but its part is {:?}", id.0, lease.role, part.place))?;
         }
-        let own = |id: &NodeId, lease: &LeaseId| {
-            self.leases.get(lease).is_some_and(|of| of.node == *id && self.part(of.part).place == Place::Leased(*lease))
-        };
+        let held: usize = self.members.values().map(|member| member.held.len()).sum();
+        expect(held == self.leases.values().filter(|lease| lease.role != Role::Stray).count(), "an attempt that counts is held by nobody")?;
+        let own = |id: &NodeId, lease: &LeaseId| self.leases.get(lease).is_some_and(|of| of.node == *id && of.role != Role::Stray);
         self.members.iter().try_for_each(|(id, member)| {
             expect(member.held.iter().all(|lease| own(id, lease)), &format!("node {} holds a lease that is not its own", id.0))
         })

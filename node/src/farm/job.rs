@@ -56,8 +56,10 @@ pub(super) struct Member {
     pub pace: f64,
     /// Parts that wait for it, hardest first (on the film's order under the naive policy).
     pub queue: VecDeque<PartId>,
-    /// Attempts that it holds and that count, in the order in which they were handed out.
+    /// Attempts that it holds and that are not stray, in the order in which they were handed out.
     pub held: Vec<LeaseId>,
+    /// Attempts that took so long that their lanes are taken to hang.
+    pub hanging: BTreeSet<LeaseId>,
 }
 
 impl Member {
@@ -66,8 +68,18 @@ impl Member {
         self.speed.map(|speed| speed * f64::from(self.info.lanes.max(1)))
     }
 
+    /// Lanes that work.
+    pub fn lanes(&self) -> usize {
+        (self.info.lanes.max(1) as usize).saturating_sub(self.hanging.len())
+    }
+
     pub fn capacity(&self, config: &FarmConfig) -> usize {
-        self.info.lanes.max(1) as usize * (1 + config.prefetch_per_lane)
+        self.lanes() * (1 + config.prefetch_per_lane)
+    }
+
+    /// Whether a lane of it has nothing to do.
+    pub fn is_idle(&self) -> bool {
+        self.queue.is_empty() && self.held.len() < self.lanes()
     }
 }
 
@@ -86,6 +98,14 @@ pub(super) struct Job {
     /// Attempts whose pixels are on their way to the disk, with their parts.
     pub committing: BTreeMap<LeaseId, PartId>,
     pub committed: usize,
+    /// Parts that are replaced by smaller ones, or are holes.
+    pub dropped: usize,
+    /// Parts whose pixels another node is to render again, for comparison.
+    pub audits: BTreeSet<PartId>,
+    /// Nodes that delivered wrong pixels, with what is to be said of it, until the farm has dealt with them.
+    pub offenders: Vec<(NodeId, String)>,
+    /// Parts that were cut up, or given up, because nobody could render them.
+    pub narrowed: usize,
     /// Cost of all parts, and of those on disk.
     pub cost: (f64, f64),
     /// Number of parts; they themselves are forgotten some time after the end.
@@ -96,6 +116,8 @@ pub(super) struct Job {
     pub deserted: Option<Duration>,
     /// When nodes with nothing to do look again for something to take.
     pub reconsider: Option<Duration>,
+    /// When the next attempt will have taken suspiciously long.
+    pub next_due: Option<Duration>,
     pub log: Log,
 }
 
@@ -113,9 +135,14 @@ impl Job {
             leases: BTreeMap::new(),
             committing: BTreeMap::new(),
             committed: 0,
+            dropped: 0,
+            audits: BTreeSet::new(),
+            offenders: Vec::new(),
+            narrowed: 0,
             cost: (0.0, 0.0),
             split_into: 0,
             reconsider: None,
+            next_due: None,
             question: None,
             deserted: None,
             log: Log { submitted: now, ..Log::default() },
@@ -157,12 +184,13 @@ impl Job {
         };
         let deserted = self.deserted.map(|since| since + config.no_node_timeout);
         let question = self.question.as_ref().map(|question| question.deadline);
-        preparing.chain(phase).chain(deserted).chain(question).chain(self.reconsider).min()
+        preparing.chain(phase).chain(deserted).chain(question).chain(self.reconsider).chain(self.next_due).min()
     }
 
-    /// Nodes that get work now: there, with the scene, and measured.
+    /// Nodes that get work now: there, with the scene, measured, and with a lane that works.
     pub fn usable(&self, nodes: &Nodes, id: NodeId) -> bool {
-        self.members.get(&id).is_some_and(|member| member.stage == Stage::Measured) && nodes.get(&id).is_some_and(|node| node.is_ready())
+        let able = |member: &Member| member.stage == Stage::Measured && member.lanes() > 0;
+        self.members.get(&id).is_some_and(able) && nodes.get(&id).is_some_and(|node| node.is_ready())
     }
 
     /// Usable nodes with their power, most powerful first.
@@ -185,6 +213,11 @@ impl Job {
     /// The samples of a whole part.
     pub fn all_samples(&self) -> SampleRange {
         SampleRange { first: 0, count: self.spec.samples }
+    }
+
+    /// Whether every part is in the picture, or never will be.
+    pub fn is_settled(&self) -> bool {
+        self.committed + self.dropped == self.parts.len()
     }
 
     pub fn part(&self, id: PartId) -> &PartState {

@@ -1,13 +1,17 @@
 //! The farm's core: a state machine without clocks, sockets, disks, threads or Lua. `step(now, event)` puts out commands.
 //!
 //! A job goes through phases, a file each: it waits its turn (`running`), nodes gather and compile its scene (`gathering`), costs are measured
-//! (`probing`), it is split and assigned (`planning`), its parts are rendered (`rendering`, `stealing`, `redistribution`), and it ends (`ending`).
-//! Nodes come and go at any time (`presence`). Events change what is known; then `Job::advance` does all that has become possible.
+//! (`probing`), it is split and assigned (`planning`), its parts are handed out and come back (`rendering`, `delivering`), and it ends (`ending`).
+//! Meanwhile parts move to who is free (`stealing`, `tail`) or still there (`redistribution`, `progress`), are cut up where nobody can render
+//! them (`failing`), and are compared (`auditing`). Nodes come and go at any time (`presence`). Events change what is known; then `Job::advance` does all that has become possible.
 
+mod auditing;
 mod command;
 mod config;
+mod delivering;
 mod ending;
 mod event;
+mod failing;
 mod gathering;
 mod id;
 mod invariants;
@@ -18,10 +22,12 @@ mod part;
 mod planning;
 mod presence;
 mod probing;
+mod progress;
 mod record;
 mod redistribution;
 mod rendering;
 mod stealing;
+mod tail;
 #[cfg(test)]
 mod tests;
 mod turn;
@@ -35,6 +41,7 @@ pub use id::{Incarnation, JobId, LeaseId, PolicyId};
 pub use node::{NodeSnapshot, NodeState};
 pub use record::{JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
 
+use delivering::Delivery;
 use job::Job;
 use node::Nodes;
 use turn::Turn;
@@ -85,11 +92,14 @@ impl Farm {
                 self.of_node(node, incarnation, job, |job, _, _| job.probed(node, &cells));
             }
             Event::Rendered { node, incarnation, job, lease, hash, seconds } => {
-                self.rendered(node, incarnation, job, lease, hash, seconds);
+                self.rendered(job, Delivery { node, incarnation, lease, hash, seconds });
             }
             Event::RenderFailed { node, incarnation, job, lease, reason } => {
                 self.of_node(node, incarnation, job, |job, turn, nodes| job.render_failed(turn, nodes, node, lease, &reason));
             }
+            Event::Stopped { node, incarnation, job, lease } => self.stopped(node, incarnation, job, lease),
+            Event::NodeReleased { node } => self.node_released(node),
+            Event::PixelsLost { job, part, reason } => self.with_job(job, |job, turn, _| job.pixels_lost(turn, part, &reason)),
             Event::Committed { job, lease } => self.with_job(job, |job, turn, _| job.committed(turn, lease)),
             Event::Assembled { job, result } => self.with_job(job, |job, turn, nodes| job.assembled(turn, nodes, result)),
         }

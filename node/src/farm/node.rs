@@ -38,6 +38,8 @@ pub enum NodeState {
     Suspected,
     /// Its life is over.
     Lost,
+    /// It delivered wrong pixels: it gets no work until an operator releases it.
+    Quarantined,
 }
 
 impl Node {
@@ -53,7 +55,7 @@ impl Node {
 
     /// Whether this life of it goes on, as far as the farm knows.
     pub fn lives(&self, incarnation: Incarnation) -> bool {
-        self.incarnation == incarnation && self.state != NodeState::Lost
+        self.incarnation == incarnation && !matches!(self.state, NodeState::Lost | NodeState::Quarantined)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::limits::ATTEMPTS_LISTED_PER_PART;
 use crate::manifest::{AttemptEntry, AttemptOutcome, PartEntry};
 use crate::schedule::{NodeId, Part, PartId};
 
-/// Where a part is. It is in one place only, and never leaves [`Place::Committed`].
+/// Where a part is. It is in one place only. It leaves [`Place::Committed`] only when its pixels are revoked or lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Place {
     /// With no node: it waits for a policy or for a node.
@@ -22,6 +22,23 @@ pub(super) enum Place {
     Committing(LeaseId),
     /// Its pixels are on disk.
     Committed(LeaseId),
+    /// Smaller parts took its place.
+    Replaced,
+    /// Nobody can render it: the picture has a hole there.
+    Hole,
+}
+
+/// What an attempt is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// It is the one that its part's place names.
+    Main,
+    /// It races with that one.
+    Spare,
+    /// Its part is delivered; its pixels are compared with those.
+    Audit,
+    /// It does not count any more, but may still end well.
+    Stray,
 }
 
 /// A part of a running job.
@@ -30,11 +47,18 @@ pub(super) struct PartState {
     pub id: PartId,
     pub rect: Rect,
     pub cost: f64,
+    /// Cost by what is known now: more than was predicted, if an attempt took longer.
+    pub expected: f64,
     pub place: Place,
     pub planned: Option<NodeId>,
-    pub hash: Option<[u8; 32]>,
-    /// Nodes that said they could not, with their reasons.
+    /// Nodes that delivered it, with the hashes of their pixels: first the one whose pixels are taken, then those that were asked to compare.
+    pub votes: Vec<(NodeId, [u8; 32])>,
+    /// Nodes that said they could not, or died of it, with reasons.
     pub failures: Vec<(NodeId, String)>,
+    /// Whether it was cut from a part that nobody could render.
+    pub suspect: bool,
+    /// The parts that took its place.
+    pub replaced_by: Vec<PartId>,
     pub attempts: Vec<Attempt>,
 }
 
@@ -50,24 +74,39 @@ pub(super) struct Attempt {
     pub reason: Option<String>,
 }
 
-/// An attempt that may still end well. Its part's place tells whether it is the one that counts on, or a stray.
+/// An attempt that may still end well.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Lease {
     pub part: PartId,
     pub node: NodeId,
     pub incarnation: Incarnation,
+    pub role: Role,
     /// When a lane can have begun it, by what the farm knows.
     pub begun: Option<Duration>,
+    /// When it will have taken suspiciously long.
+    pub due: Option<Duration>,
 }
 
 impl PartState {
     pub fn new(id: PartId, rect: Rect, cost: f64) -> Self {
-        Self { id, rect, cost, place: Place::Loose, planned: None, hash: None, failures: Vec::new(), attempts: Vec::new() }
+        Self {
+            id,
+            rect,
+            cost,
+            expected: cost,
+            place: Place::Loose,
+            planned: None,
+            votes: Vec::new(),
+            failures: Vec::new(),
+            suspect: false,
+            replaced_by: Vec::new(),
+            attempts: Vec::new(),
+        }
     }
 
     /// The part as policies see it.
     pub fn describe(&self) -> Part {
-        Part { id: self.id, rect: self.rect, cost: self.cost }
+        Part { id: self.id, rect: self.rect, cost: self.expected }
     }
 
     /// The attempt whose pixels are on disk.
@@ -78,6 +117,15 @@ impl PartState {
     /// Whether its pixels are here.
     pub fn is_delivered(&self) -> bool {
         matches!(self.place, Place::Committing(_) | Place::Committed(_))
+    }
+
+    /// Whether nothing is left to do for it, but perhaps to compare.
+    pub fn is_settled(&self) -> bool {
+        matches!(self.place, Place::Committed(_) | Place::Replaced | Place::Hole)
+    }
+
+    pub fn voted(&self, node: NodeId) -> bool {
+        self.votes.iter().any(|(voter, _)| *voter == node)
     }
 
     pub fn failed_on(&self, node: NodeId) -> bool {
@@ -104,12 +152,12 @@ impl PartState {
         }
     }
 
-    /// Its pixels are gone with the coordinator's memory.
-    pub fn lose_pixels(&mut self, lease: LeaseId) {
-        self.hash = None;
+    /// Pixels that it had are gone, or not to be trusted.
+    pub fn lose_pixels(&mut self, lease: LeaseId, outcome: AttemptOutcome, reason: &str) {
+        self.votes.clear();
         if let Some(attempt) = self.attempt_mut(lease) {
-            attempt.outcome = AttemptOutcome::Lost;
-            attempt.reason = Some("the coordinator was started anew".into());
+            attempt.outcome = outcome;
+            attempt.reason = Some(reason.to_owned());
         }
     }
 
@@ -123,12 +171,14 @@ impl PartState {
             outcome: attempt.outcome,
             reason: attempt.reason.clone(),
         };
+        let hash = self.votes.first().filter(|_| self.committed_by().is_some()).map(|(_, hash)| hash);
         PartEntry {
             id: self.id,
             rect: [self.rect.x, self.rect.y, self.rect.width, self.rect.height],
             predicted: self.cost,
             planned: self.planned,
-            hash: self.hash.filter(|_| self.committed_by().is_some()).map(|hash| hash.iter().map(|byte| format!("{byte:02x}")).collect()),
+            hash: hash.map(|hash| hash.iter().map(|byte| format!("{byte:02x}")).collect()),
+            replaced_by: self.replaced_by.clone(),
             attempts: self.attempts.iter().map(entry).collect(),
         }
     }

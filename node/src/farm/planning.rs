@@ -90,7 +90,7 @@ impl Job {
     pub(super) fn backlog(&self) -> Backlog {
         let of = |member: &super::job::Member| {
             let held = member.held.iter().filter_map(|lease| self.leases.get(lease)).map(|lease| lease.part);
-            held.chain(member.queue.iter().copied()).map(|part| self.part(part).cost).sum()
+            held.chain(member.queue.iter().copied()).map(|part| self.part(part).expected).sum()
         };
         self.members.iter().map(|(id, member)| (*id, of(member))).collect()
     }

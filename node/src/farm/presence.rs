@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::auditing::quarantined;
 use super::node::{Node, NodeState};
 use super::{Command, Farm, FarmConfig, Incarnation, JobId, NodeInfo, ToNode};
 use crate::limits::NODES;
@@ -16,13 +17,17 @@ impl Farm {
                 self.node_heard(node, incarnation);
                 return self.repeat_orders(node);
             }
+            Some(known) if known.state == NodeState::Quarantined => {
+                let reason = quarantined(&known.reason);
+                return self.turn.put(Command::Close { node, incarnation, reason });
+            }
             Some(known) if known.incarnation == incarnation => {
                 let reason = format!("this life of the node is over ({}); it is welcome with a new one", known.reason);
                 return self.turn.put(Command::Close { node, incarnation, reason });
             }
             Some(known) if known.state != NodeState::Lost => {
                 let old = known.incarnation;
-                self.lose(node, "it started anew");
+                self.lose(node, "it started anew", true);
                 self.turn.put(Command::Close { node, incarnation: old, reason: "a newer life of this node has joined".into() });
             }
             None if self.nodes.len() >= NODES => {
@@ -79,7 +84,7 @@ impl Farm {
 
     pub(super) fn node_left(&mut self, node: NodeId, incarnation: Incarnation, reason: &str) {
         if self.nodes.get(&node).is_some_and(|known| known.lives(incarnation)) {
-            self.lose(node, reason);
+            self.lose(node, reason, false);
         }
     }
 
@@ -92,7 +97,7 @@ impl Farm {
             let silence = now.saturating_sub(node.heard).as_secs_f64();
             if now >= node.heard + config.dead_after {
                 let (incarnation, reason) = (node.incarnation, format!("silent for {silence:.1} s"));
-                self.lose(id, &reason);
+                self.lose(id, &reason, true);
                 self.turn.put(Command::Close { node: id, incarnation, reason });
                 continue;
             }
@@ -117,8 +122,8 @@ impl Farm {
         }
     }
 
-    /// The life of a node is over.
-    fn lose(&mut self, node: NodeId, reason: &str) {
+    /// The life of a node is over: it `crashed`, for all that is known, or went.
+    fn lose(&mut self, node: NodeId, reason: &str, crashed: bool) {
         let Some(known) = self.nodes.get_mut(&node) else { return };
         let refused = known.state == NodeState::Refused;
         known.state = NodeState::Lost;
@@ -129,7 +134,7 @@ impl Farm {
             self.note(EventKind::Lost, node, reason.to_owned());
         }
         let reason = reason.to_owned();
-        self.with_running(|job, turn, nodes| job.node_lost(turn, nodes, node, &reason));
+        self.with_running(|job, turn, nodes| job.node_lost(turn, nodes, node, &reason, crashed));
     }
 
     fn note(&mut self, kind: EventKind, node: NodeId, detail: String) {
@@ -149,7 +154,7 @@ impl Node {
         match self.state {
             NodeState::Proving | NodeState::Ready => Some(self.heard + config.suspect_after),
             NodeState::Suspected | NodeState::Refused => Some(self.heard + config.dead_after),
-            NodeState::Lost => None,
+            NodeState::Lost | NodeState::Quarantined => None,
         }
     }
 

@@ -62,6 +62,8 @@ pub enum PartPhase {
     Rendering,
     /// Its pixels are on disk.
     Committed,
+    /// Nobody can render it.
+    LeftOut,
 }
 
 /// A part, for the status page.
@@ -104,6 +106,8 @@ pub struct JobRecord {
     pub difficulty: Vec<PartId>,
     /// The paper's table R_p, of measured nodes.
     pub power: Vec<NodeId>,
+    /// Parts that nobody could render.
+    pub holes: usize,
     /// What happened, in order of time.
     pub events: Vec<EventEntry>,
     /// What the user should know.
@@ -143,9 +147,15 @@ impl Farm {
         self.jobs.get(&job).map(|job| record(job, self.turn.now))
     }
 
-    /// Parts of a job, in order of their ids, and how far each is.
+    /// Parts of a job, in order of their ids, and how far each is; without those that smaller ones replaced.
     pub fn parts(&self, job: JobId) -> Vec<PartSnapshot> {
-        self.jobs.get(&job).map_or(&[][..], |job| &job.parts).iter().map(part_snapshot).collect()
+        let parts = self.jobs.get(&job).map_or(&[][..], |job| &job.parts).iter();
+        parts.filter(|part| part.place != Place::Replaced).map(part_snapshot).collect()
+    }
+
+    /// Rectangles of a job that nobody could render.
+    pub fn holes(&self, job: JobId) -> Vec<Rect> {
+        self.jobs.get(&job).map_or_else(Vec::new, |job| job.holes().map(|part| part.rect).collect())
     }
 
     /// Parts of a job that are committed, with the attempt that holds their pixels.
@@ -157,7 +167,8 @@ impl Farm {
 
 fn part_snapshot(part: &PartState) -> PartSnapshot {
     let (phase, lease) = match part.place {
-        Place::Loose | Place::Queued(_) => (PartPhase::Waiting, None),
+        Place::Loose | Place::Queued(_) | Place::Replaced => (PartPhase::Waiting, None),
+        Place::Hole => (PartPhase::LeftOut, None),
         Place::Leased(lease) | Place::Committing(lease) => (PartPhase::Rendering, Some(lease)),
         Place::Committed(lease) => (PartPhase::Committed, Some(lease)),
     };
@@ -208,6 +219,7 @@ fn record(job: &Job, now: Duration) -> JobRecord {
         parts: job.parts.iter().map(|part| part.entry(&job.log)).collect(),
         difficulty: evaluate::difficulty(&parts),
         power: powers.iter().map(|node| node.id).collect(),
+        holes: job.holes().count(),
         events: job.log.events.clone(),
         warnings: job.log.warnings.clone(),
     }

@@ -2,7 +2,7 @@
 
 use super::job::{Job, Phase, Stage};
 use super::node::Nodes;
-use super::part::Place;
+use super::part::{Lease, Place, Role};
 use super::turn::Turn;
 use super::{LeaseId, Question};
 use crate::manifest::{AttemptOutcome, EventKind};
@@ -21,10 +21,12 @@ impl Job {
         let strays: Vec<(LeaseId, PartId)> =
             self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.part)).collect();
         for (lease, part) in strays {
-            if matches!(self.part(part).place, Place::Loose | Place::Queued(_)) {
+            let hangs = self.members.get(&id).is_some_and(|member| member.hanging.contains(&lease));
+            if !hangs && matches!(self.part(part).place, Place::Loose | Place::Queued(_)) {
                 self.unplace(part);
                 self.loose.remove(&part);
                 self.part_mut(part).place = Place::Leased(lease);
+                self.leases.entry(lease).and_modify(|lease| lease.role = Role::Main);
                 self.members.entry(id).and_modify(|member| member.held.push(lease));
             }
         }
@@ -35,29 +37,33 @@ impl Job {
     }
 
     /// The life of a node is over: nothing of it counts any more.
-    pub fn node_lost(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, reason: &str) {
+    /// If it `crashed`, it may have been for what its lanes rendered.
+    pub fn node_lost(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, reason: &str, crashed: bool) {
         self.strip(turn, id, "its node was lost");
-        let void: Vec<LeaseId> = self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, _)| *lease).collect();
-        for lease in void {
-            self.close(turn, lease, AttemptOutcome::Lost, reason);
+        let void: Vec<(LeaseId, Lease)> =
+            self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.clone())).collect();
+        for (lease, of) in &void {
+            self.close(turn, *lease, AttemptOutcome::Lost, reason);
+            if crashed && of.begun.is_some() && of.role != Role::Audit {
+                self.part_mut(of.part).failures.push((id, format!("it was lost meanwhile: {reason}")));
+            }
         }
         if let Some(member) = self.members.get_mut(&id) {
             member.stage = Stage::Away;
+            member.hanging.clear();
         }
         self.probe_without(turn, nodes, id);
+        void.into_iter().for_each(|(_, of)| self.consider_failures(turn, nodes, of.part));
     }
 
     /// Takes everything undelivered from a node.
-    fn strip(&mut self, turn: &mut Turn, id: NodeId, why: &str) {
+    pub(super) fn strip(&mut self, turn: &mut Turn, id: NodeId, why: &str) {
         let Some(member) = self.members.get_mut(&id) else { return };
-        let queued = std::mem::take(&mut member.queue);
-        let held = std::mem::take(&mut member.held);
-        let held = held.iter().filter_map(|lease| self.leases.get(lease)).map(|lease| lease.part);
-        let parts: Vec<PartId> = held.chain(queued).collect();
-        for part in &parts {
-            self.part_mut(*part).place = Place::Loose;
-            self.loose.insert(*part);
-        }
+        let (held, queued) = (std::mem::take(&mut member.held), member.queue.clone());
+        let main = held.iter().filter_map(|lease| self.leases.get(lease)).filter(|lease| lease.role == Role::Main).map(|lease| lease.part);
+        let parts: Vec<PartId> = main.chain(queued.iter().copied()).collect();
+        held.into_iter().for_each(|lease| self.set_aside(lease));
+        queued.into_iter().for_each(|part| self.unplace(part));
         if !parts.is_empty() {
             self.log.event(turn.now, EventKind::Reassigned, Some(id), parts, why);
         }

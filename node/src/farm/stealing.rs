@@ -9,7 +9,10 @@ use super::job::{Job, Member};
 use super::node::Nodes;
 use super::part::Place;
 use super::turn::Turn;
-use super::{LeaseId, part::Lease};
+use super::{
+    LeaseId,
+    part::{Lease, Role},
+};
 use crate::limits::STEAL_INTERVAL;
 use crate::manifest::AttemptOutcome;
 use crate::schedule::{NodeId, PartId};
@@ -25,12 +28,8 @@ const OVERDUE: f64 = 0.5;
 
 impl Member {
     /// Cost that one lane does in a second, by the latest parts.
-    fn lane_speed(&self) -> f64 {
+    pub fn lane_speed(&self) -> f64 {
         self.speed.unwrap_or(1.0) / self.pace
-    }
-
-    fn lanes(&self) -> usize {
-        self.info.lanes.max(1) as usize
     }
 
     /// Takes note of how long a part really took.
@@ -89,10 +88,12 @@ impl Job {
     fn loot(&self, now: Duration, thief: NodeId, victim: &Victim) -> Option<PartId> {
         let (member, from) = (self.members.get(&thief)?, self.members.get(&victim.id)?);
         let idle = member.held.len() < member.lanes();
-        let delay = if idle { 0.0 } else { self.held_cost(now, member) / (member.lane_speed() * member.lanes() as f64) };
+        let delay = if idle { 0.0 } else { self.held_cost(now, member) / (member.lane_speed() * member.lanes().max(1) as f64) };
         let pays = |part: &PartId| {
             let state = self.part(*part);
-            delay + state.cost / member.lane_speed() < victim.finish && !state.failed_on(thief)
+            delay + state.expected / member.lane_speed() < victim.finish
+                && !state.failed_on(thief)
+                && (!state.suspect || member.held.is_empty())
         };
         let queued = from.queue.iter().copied().find(pays);
         queued.or_else(|| idle.then(|| self.not_begun(from)).flatten().map(|(_, lease)| lease.part).filter(pays))
@@ -111,25 +112,27 @@ impl Job {
     /// The last attempt that a node holds, if no lane can have begun it.
     fn not_begun(&self, member: &Member) -> Option<(LeaseId, &Lease)> {
         let last = member.held.last().filter(|_| member.held.len() > member.lanes())?;
-        self.leases.get(last).filter(|lease| lease.begun.is_none()).map(|lease| (*last, lease))
+        self.leases.get(last).filter(|lease| lease.begun.is_none() && lease.role == Role::Main).map(|lease| (*last, lease))
     }
 
     /// A node as a victim, if there is something to take.
     fn victim(&self, now: Duration, id: NodeId) -> Option<Victim> {
         let member = self.members.get(&id)?;
         let last = member.queue.back().copied().or_else(|| self.not_begun(member).map(|(_, lease)| lease.part))?;
-        let cost = self.held_cost(now, member) + member.queue.iter().map(|part| self.part(*part).cost).sum::<f64>();
-        let (last, speed) = (self.part(last).cost, member.lane_speed());
-        Some(Victim { id, finish: (cost - last).max(0.0) / (speed * member.lanes() as f64) + last / speed })
+        let cost = self.held_cost(now, member) + member.queue.iter().map(|part| self.part(*part).expected).sum::<f64>();
+        let (last, speed) = (self.part(last).expected, member.lane_speed());
+        Some(Victim { id, finish: (cost - last).max(0.0) / (speed * member.lanes().max(1) as f64) + last / speed })
     }
 
     /// Cost that is left of what a node holds.
     fn held_cost(&self, now: Duration, member: &Member) -> f64 {
-        let left = |lease: &Lease| {
-            let done = lease.begun.map_or(0.0, |begun| now.saturating_sub(begun).as_secs_f64() * member.lane_speed());
-            let left = self.part(lease.part).cost - done;
-            if left >= 0.0 { left } else { -left * OVERDUE }
-        };
-        member.held.iter().filter_map(|lease| self.leases.get(lease)).map(left).sum()
+        member.held.iter().filter_map(|lease| self.leases.get(lease)).map(|lease| self.left_of(now, member, lease)).sum()
+    }
+
+    /// Cost that is left of an attempt, as far as that can be told.
+    pub(super) fn left_of(&self, now: Duration, member: &Member, lease: &Lease) -> f64 {
+        let done = lease.begun.map_or(0.0, |begun| now.saturating_sub(begun).as_secs_f64() * member.lane_speed());
+        let left = self.part(lease.part).expected - done;
+        if left >= 0.0 { left } else { -left * OVERDUE }
     }
 }

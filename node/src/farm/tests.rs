@@ -107,6 +107,7 @@ fn spec(assign: Assign, min_nodes: u32) -> JobSpec {
         split: Split::Grid { width: 16, height: 16 },
         assign,
         min_nodes,
+        audit: 0.0,
     }
 }
 

@@ -22,6 +22,8 @@ pub struct JobDescription {
     pub split: Split,
     /// How parts are assigned.
     pub assign: Assign,
+    /// Share of the parts that two nodes render, to compare their pixels: 0 to 1.
+    pub audit: f64,
     /// What is written.
     pub output: Output,
     /// The script itself, where a policy is one of its functions.

@@ -79,6 +79,7 @@ pub struct JobNode {
     pub assign: Policy<Assign>,
     pub output: Output,
     pub seed: u64,
+    pub audit: f64,
 }
 
 /// A built-in policy, or the script's own function.

@@ -74,6 +74,7 @@ fn describe(
         probe: job.probe.clone(),
         split,
         assign,
+        audit: job.audit,
         output: job.output.clone(),
         script: asks_script.then(|| ScriptBundle { name, source, modules: context.modules.into_loaded() }),
         parameters: parameters.clone(),

@@ -13,6 +13,7 @@ fn spec() -> JobSpec {
         split: Split::Grid { width: 16, height: 16 },
         assign: Assign::EarliestFinish,
         min_nodes: 1,
+        audit: 0.0,
     }
 }
 

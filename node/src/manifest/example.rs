@@ -73,6 +73,7 @@ impl Example {
             planned: Some(NodeId(0)),
             hash: Some("00".repeat(32)),
             attempts: attempts.collect(),
+            replaced_by: Vec::new(),
         });
         self
     }
@@ -102,6 +103,7 @@ impl Example {
             pixel_type: PixelType::Float,
             pixels_hash: "22".repeat(32),
             clamped: 0,
+            holes: Vec::new(),
         };
         build(submission, image, self.record, 42.0)
     }

@@ -82,6 +82,9 @@ pub struct ImageEntry {
     pub pixel_type: PixelType,
     /// BLAKE3 of the pixels as they are read from the EXR (float32, little-endian, RGB, row by row), in hexadecimal.
     pub pixels_hash: String,
+    /// Rectangles that nobody could render: `[x, y, width, height]`. They are black in the EXR and magenta in the preview.
+    #[serde(default)]
+    pub holes: Vec<[u32; 4]>,
     /// Values that half floats could not hold and that were clamped, where the EXR holds half floats.
     pub clamped: u64,
 }
@@ -157,6 +160,9 @@ pub struct PartEntry {
     pub hash: Option<String>,
     /// Attempts in order of their start.
     pub attempts: Vec<AttemptEntry>,
+    /// Smaller parts that took its place, where it was cut up.
+    #[serde(default)]
+    pub replaced_by: Vec<PartId>,
 }
 
 /// One attempt at a part.
@@ -195,6 +201,10 @@ pub enum AttemptOutcome {
     Lost,
     /// It was called back.
     Cancelled,
+    /// Its pixels were compared with those of another attempt.
+    Compared,
+    /// Its node turned out to deliver wrong pixels.
+    Revoked,
 }
 
 /// Something that happened.
@@ -239,6 +249,20 @@ pub enum EventKind {
     RenderFinished,
     /// The job's own policy failed or was late; a built-in one decided.
     PolicyReplaced,
+    /// An attempt took far longer than predicted; another lane tries too.
+    Overdue,
+    /// An idle node renders a part that another one holds too.
+    Speculated,
+    /// A part was replaced by smaller ones.
+    Cut,
+    /// A part that nobody could render was left out of the picture.
+    LeftOut,
+    /// A node delivered wrong pixels; it gets no work any more.
+    Quarantined,
+    /// Committed parts do not count any more, and are rendered again.
+    Revoked,
+    /// Parts that were to be rendered twice were not.
+    AuditSkipped,
 }
 
 /// What came of it, in the paper's terms.

@@ -27,12 +27,19 @@ pub(super) struct Node {
     pub life: u64,
     pub slowness: f64,
     pub fails_next: bool,
-    /// Until when the process stands still, and until when nothing passes.
+    /// Whether the next part that a lane begins makes it hang.
+    pub hangs_next: bool,
+    /// Whether its pixels are wrong.
+    pub corrupt: bool,
+    /// Until when the process stands still, and until when nothing passes to it and from it.
     pub paused: Duration,
-    pub parted: Duration,
+    pub deaf: Duration,
+    pub mute: Duration,
     /// Last moment at which a message of the farm arrives: they arrive in order.
     pub link: Duration,
     pub running: BTreeMap<LeaseId, Task>,
+    /// Attempts of lanes that hang.
+    hanging: BTreeSet<LeaseId>,
     waiting: VecDeque<Task>,
     delivered: BTreeMap<LeaseId, Event>,
     prepared: BTreeSet<JobId>,
@@ -42,6 +49,8 @@ pub(super) struct Node {
 pub(super) enum Act {
     Say(f64, Event),
     Finish(f64, Task),
+    /// The process dies at once.
+    Die,
 }
 
 impl Node {
@@ -53,10 +62,14 @@ impl Node {
             life: 0,
             slowness: 1.0,
             fails_next: false,
+            hangs_next: false,
+            corrupt: false,
             paused: Duration::ZERO,
-            parted: Duration::ZERO,
+            deaf: Duration::ZERO,
+            mute: Duration::ZERO,
             link: Duration::ZERO,
             running: BTreeMap::new(),
+            hanging: BTreeSet::new(),
             waiting: VecDeque::new(),
             delivered: BTreeMap::new(),
             prepared: BTreeSet::new(),
@@ -71,13 +84,14 @@ impl Node {
     pub fn start(&mut self) {
         self.end();
         (self.alive, self.life) = (true, self.life + 1);
-        (self.paused, self.parted) = (Duration::ZERO, Duration::ZERO);
+        (self.paused, self.deaf, self.mute) = (Duration::ZERO, Duration::ZERO, Duration::ZERO);
     }
 
     /// The process ends, and all that it had in memory.
     pub fn end(&mut self) {
-        self.alive = false;
+        (self.alive, self.hangs_next) = (false, false);
         self.running.clear();
+        self.hanging.clear();
         self.waiting.clear();
         self.delivered.clear();
         self.prepared.clear();
@@ -101,15 +115,20 @@ impl Node {
             }
             ToNode::Probe { job, cells, .. } => vec![self.probe(job, &cells, scenario, random)],
             ToNode::Render { job, lease, rect, .. } => self.render(Task { job, lease, rect }, scenario, random),
-            ToNode::Cancel { lease, .. } => {
+            ToNode::Cancel { lease, .. } if self.hanging.contains(&lease) => Vec::new(),
+            ToNode::Cancel { job, lease } => {
                 self.waiting.retain(|task| task.lease != lease);
                 self.running.remove(&lease);
-                self.begin(scenario, random)
+                self.delivered.remove(&lease);
+                let mut acts = vec![Act::Say(0.0, Event::Stopped { node, incarnation, job, lease })];
+                acts.extend(self.begin(scenario, random));
+                acts
             }
             ToNode::Release { job } => {
                 self.prepared.remove(&job);
                 self.waiting.retain(|task| task.job != job);
                 self.running.retain(|_, task| task.job != job);
+                self.delivered.clear();
                 Vec::new()
             }
         }
@@ -145,6 +164,10 @@ impl Node {
         while self.running.len() < self.machine.lanes as usize {
             let Some(task) = self.waiting.pop_front() else { break };
             self.running.insert(task.lease, task);
+            if std::mem::take(&mut self.hangs_next) {
+                self.hanging.insert(task.lease);
+                continue;
+            }
             acts.push(Act::Finish(self.seconds(scenario.cost_of(task.rect), random), task));
         }
         acts
@@ -154,10 +177,14 @@ impl Node {
     pub fn finish(&mut self, task: Task, seconds: f64, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
         let Some(task) = self.running.remove(&task.lease) else { return Vec::new() };
         let (node, incarnation, Task { job, lease, rect }) = (self.id, self.incarnation(), task);
-        let event = if std::mem::take(&mut self.fails_next) {
+        let poisoned = scenario.poison.is_some_and(|poison| poison.is_in(rect));
+        if poisoned && scenario.poison.is_some_and(|poison| poison.kills) {
+            return vec![Act::Die];
+        }
+        let event = if poisoned || std::mem::take(&mut self.fails_next) {
             Event::RenderFailed { node, incarnation, job, lease, reason: "the lane panicked".into() }
         } else {
-            let hash = *blake3::hash(format!("{rect:?}").as_bytes()).as_bytes();
+            let hash = true_hash(rect).map(|byte| if self.corrupt { byte ^ (1 + self.id.0 as u8) } else { byte });
             Event::Rendered { node, incarnation, job, lease, hash, seconds }
         };
         self.delivered.insert(lease, event.clone());
@@ -170,4 +197,9 @@ impl Node {
         let jitter = 1.0 + self.machine.jitter * random.between(-1.0, 1.0);
         cost / self.machine.speed * self.slowness * jitter
     }
+}
+
+/// The hash of a part's right pixels.
+pub(super) fn true_hash(rect: Rect) -> [u8; 32] {
+    *blake3::hash(format!("{rect:?}").as_bytes()).as_bytes()
 }

@@ -10,5 +10,5 @@ mod scenario;
 mod world;
 
 pub use run::Run;
-pub use scenario::{Fault, Machine, Network, Scenario, ScriptPolicy};
+pub use scenario::{Fault, Machine, Network, Poison, Scenario, ScriptPolicy};
 pub use world::World;

@@ -47,6 +47,18 @@ pub enum Fault {
     Pause(usize, Duration),
     /// Nothing passes between the node and the coordinator for so long; then what was sent on streams arrives.
     Partition(usize, Duration),
+    /// The same for what is sent to the node.
+    Deafen(usize, Duration),
+    /// The same for what the node sends.
+    Mute(usize, Duration),
+    /// The next part that a lane begins makes it hang for ever.
+    Hang(usize),
+    /// Pixels of the machine are wrong from now on.
+    Corrupt(usize),
+    /// The pixels of one part cannot be read back when the picture is put together.
+    DamagePixels,
+    /// The coordinator's process stands still for so long.
+    Stall(Duration),
     /// Parts take so many times longer from now on.
     Slow(usize, f64),
     /// The next part that the machine finishes fails instead.
@@ -55,6 +67,23 @@ pub enum Fault {
     RestartCoordinator,
     /// A user cancels the job.
     Cancel,
+}
+
+/// A place of the frame that no node can render.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Poison {
+    /// Column.
+    pub x: u32,
+    /// Row.
+    pub y: u32,
+    /// Whether the process dies of it (and is started again); otherwise it says that it failed.
+    pub kills: bool,
+}
+
+impl Poison {
+    pub(super) fn is_in(self, rect: Rect) -> bool {
+        (rect.x..rect.x + rect.width).contains(&self.x) && (rect.y..rect.y + rect.height).contains(&self.y)
+    }
 }
 
 /// How the job's own policy behaves when parts are redistributed.
@@ -85,6 +114,8 @@ pub struct Scenario {
     pub faults: Vec<(Duration, Fault)>,
     /// The job.
     pub job: JobSpec,
+    /// What in the frame cannot be rendered.
+    pub poison: Option<Poison>,
     /// How the job's own policy behaves.
     pub policy: ScriptPolicy,
     /// True cost of the whole frame: seconds on one lane of speed 1.
@@ -118,7 +149,9 @@ impl Scenario {
                 split,
                 assign,
                 min_nodes: machines.len() as u32,
+                audit: 0.0,
             },
+            poison: None,
             policy: ScriptPolicy::Good,
             work: 600.0,
             contrast: 8.0,
@@ -157,6 +190,11 @@ impl Scenario {
             [random.below(5) as usize];
         scenario.work = random.between(0.5, 10.0) * count as f64;
         scenario.horizon = Duration::from_secs(1_000);
+        scenario.job.audit = [0.0, 0.0, 0.2, 1.0][random.below(4) as usize];
+        if random.happens(0.1) {
+            let (x, y) = (random.below(scenario.job.width), random.below(scenario.job.height));
+            scenario.poison = Some(Poison { x, y, kills: random.happens(0.5) });
+        }
         let faults = random.below(7);
         (0..faults).for_each(|_| scenario.add_fault(&mut random));
         scenario
@@ -178,7 +216,7 @@ impl Scenario {
     /// Something goes wrong somewhere; who was killed often comes back. Machine 0 comes back always.
     fn add_fault(&mut self, random: &mut Random) {
         let (at, machine) = (random.seconds(0.0, 8.0), random.below(self.machines.len() as u32) as usize);
-        let fault = match random.below(20) {
+        let fault = match random.below(28) {
             0..=5 => Fault::Kill(machine),
             6 => Fault::Leave(machine),
             7..=10 => Fault::Pause(machine, random.seconds(0.1, 15.0)),
@@ -187,11 +225,18 @@ impl Scenario {
             16 => Fault::FailPart(machine),
             17 => Fault::Start(machine),
             18 => Fault::RestartCoordinator,
+            19 => Fault::Deafen(machine, random.seconds(0.1, 15.0)),
+            20 => Fault::Mute(machine, random.seconds(0.1, 15.0)),
+            21 => Fault::Hang(machine),
+            22 | 23 if machine > 0 => Fault::Corrupt(machine),
+            24 => Fault::DamagePixels,
+            25 => Fault::Stall(random.seconds(0.05, 20.0)),
             _ if random.happens(0.1) => Fault::Cancel,
             _ => Fault::RestartCoordinator,
         };
         self.faults.push((at, fault));
-        if matches!(fault, Fault::Kill(_) | Fault::Leave(_)) && (machine == 0 || random.happens(0.6)) {
+        let ends = matches!(fault, Fault::Kill(_) | Fault::Leave(_) | Fault::Hang(_));
+        if ends && (machine == 0 || random.happens(0.6)) {
             self.faults.push((at + random.seconds(0.05, 20.0), Fault::Start(machine)));
         }
     }

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::{cmp::Reverse, time::Duration};
 
-use super::machine::{Act, Node, Task};
+use super::machine::{Act, Node, Task, true_hash};
 use super::random::Random;
 use super::{Fault, Run, Scenario, ScriptPolicy};
-use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, LeaseId, NodeState, Outcome, Question, ToNode};
+use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, LeaseId, NodeSnapshot, NodeState, Outcome, Question, ToNode};
 use crate::journal::Filter;
-use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT};
+use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT, LATE_TICK};
 use crate::schedule::{NodeId, PartId, assign, split};
+use tessera_engine::part::Rect;
 
 const JOB: JobId = JobId(1);
 
@@ -45,10 +46,16 @@ pub struct World {
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
     epoch: u64,
+    /// Until when the coordinator stands still.
+    stalled: Duration,
+    /// Whether pixels of a part are to be found damaged.
+    damaged: bool,
     filter: Filter,
     journal: Vec<(Duration, Event)>,
     /// Parts on disk, with the attempt whose pixels they are.
     disk: BTreeMap<PartId, LeaseId>,
+    /// Attempts whose pixels do not count any more.
+    revoked: BTreeSet<LeaseId>,
     /// Deliveries that the farm has to say something about.
     open: BTreeSet<LeaseId>,
     killed: BTreeMap<usize, Duration>,
@@ -74,9 +81,12 @@ impl World {
             agenda: BinaryHeap::new(),
             happenings: Vec::new(),
             epoch: 0,
+            stalled: Duration::ZERO,
+            damaged: false,
             filter: Filter::default(),
             journal: vec![(Duration::ZERO, submitted)],
             disk: BTreeMap::new(),
+            revoked: BTreeSet::new(),
             open: BTreeSet::new(),
             killed: BTreeMap::new(),
             trace: blake3::Hasher::new(),
@@ -103,10 +113,10 @@ impl World {
     pub fn run(mut self) -> Run {
         while self.run.outcome.is_none() && self.run.violations.is_empty() && self.now < self.scenario.horizon {
             let next = self.agenda.peek().map(|Reverse((at, ..))| *at);
-            match (self.farm.next_deadline(), next) {
+            match (self.farm.next_deadline().map(|deadline| deadline.max(self.stalled)), next) {
                 (Some(deadline), next) if next.is_none_or(|next| deadline < next) => {
                     self.now = self.now.max(deadline);
-                    self.step(Event::Tick);
+                    self.tick();
                 }
                 (_, Some(_)) => self.next(),
                 _ => break,
@@ -120,6 +130,18 @@ impl World {
         }
         self.run.trace = *self.trace.finalize().as_bytes();
         self.run
+    }
+
+    /// Time has come. If it is long past, the coordinator itself was away: it gives all nodes time to be heard, as the real one does.
+    fn tick(&mut self) {
+        let late = self.farm.next_deadline().is_some_and(|deadline| self.now > deadline + LATE_TICK);
+        for node in 0..self.nodes.len() {
+            if late && self.nodes[node].alive {
+                let (node, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
+                self.step(Event::NodeHeard { node, incarnation });
+            }
+        }
+        self.step(Event::Tick);
     }
 
     fn violation(&mut self, what: impl Into<String>) {
@@ -171,9 +193,12 @@ impl World {
             Happening::Finish(node, life, ..) | Happening::Beat(node, life) | Happening::Closed(node, life) => {
                 (self.lives(*node, *life), self.nodes[*node].paused)
             }
-            Happening::ToNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].paused.max(self.nodes[*node].parted)),
-            Happening::FromNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].parted),
-            _ => return None,
+            Happening::ToNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].paused.max(self.nodes[*node].deaf)),
+            Happening::FromNode(_, node, life, _) => {
+                (true, self.stalled.max(if self.lives(*node, *life) { self.nodes[*node].mute } else { self.stalled }))
+            }
+            Happening::Farm(..) | Happening::Stored(..) => (true, self.stalled),
+            Happening::Fault(_) => return None,
         };
         (node && until > self.now).then_some(until)
     }
@@ -191,6 +216,11 @@ impl World {
                     self.plan(at, Happening::Finish(node, self.nodes[node].life, task, seconds));
                 }
                 Act::Say(seconds, event) => self.say(node, seconds, event),
+                Act::Die => {
+                    self.fault(Fault::Kill(node));
+                    let again = self.now + self.random.seconds(0.3, 1.0);
+                    self.plan(again, Happening::Fault(Fault::Start(node)));
+                }
             }
         }
     }
@@ -208,7 +238,7 @@ impl World {
     fn beat(&mut self, node: usize) {
         let life = self.nodes[node].life;
         self.plan(self.now + HEARTBEAT_INTERVAL, Happening::Beat(node, life));
-        if self.nodes[node].parted <= self.now && !self.random.happens(self.scenario.network.loss) {
+        if self.nodes[node].mute <= self.now && !self.random.happens(self.scenario.network.loss) {
             let (at, incarnation) = (self.now + self.delay(), self.nodes[node].incarnation());
             let heard = Event::NodeHeard { node: NodeId(node as u32), incarnation };
             self.plan(at, Happening::Farm(heard, self.epoch));
@@ -227,6 +257,9 @@ impl World {
     }
 
     fn store(&mut self, lease: LeaseId, part: PartId) {
+        if self.revoked.contains(&lease) {
+            return;
+        }
         if let Some(first) = self.disk.insert(part, lease) {
             self.violation(format!("part {} is committed twice, by leases {} and {}", part.0, first.0, lease.0));
         }
@@ -254,6 +287,10 @@ impl World {
         }
         if let Err(wrong) = self.farm.check_invariants() {
             self.violation(wrong);
+        }
+        let innocent = |node: &NodeSnapshot| node.state == NodeState::Quarantined && !self.nodes[node.id.0 as usize].corrupt;
+        if self.farm.nodes().iter().any(innocent) {
+            self.violation("a node is in quarantine whose pixels are right");
         }
     }
 
@@ -294,6 +331,12 @@ impl World {
                 self.plan(at, Happening::Stored(lease, part, self.epoch));
             }
             Command::Discard { lease, .. } => _ = self.open.remove(&lease),
+            Command::Revoke { part, lease, .. } => {
+                self.revoked.insert(lease);
+                if self.disk.get(&part) == Some(&lease) {
+                    self.disk.remove(&part);
+                }
+            }
             Command::Assemble { .. } => self.assemble(),
             Command::End { outcome, .. } => self.run.outcome = Some(outcome),
         }
@@ -331,15 +374,34 @@ impl World {
     /// Writes the outputs, if every pixel is on disk once.
     fn assemble(&mut self) {
         let committed = self.farm.committed(JOB);
-        let rects: Vec<_> = committed.iter().map(|(_, rect, _)| *rect).collect();
+        let rects: Vec<_> = committed.iter().map(|(_, rect, _)| *rect).chain(self.farm.holes(JOB)).collect();
         if let Err(wrong) = split::validate(&rects, self.scenario.job.width, self.scenario.job.height) {
             self.violation(format!("the picture is not whole: {wrong}"));
         }
         if committed.iter().any(|(part, _, lease)| self.disk.get(part) != Some(lease)) {
             self.violation("the farm takes parts for committed that are not on disk");
         }
+        self.judge_pixels();
         let at = self.now + Duration::from_millis(50);
-        self.plan(at, Happening::Farm(Event::Assembled { job: JOB, result: Ok(()) }, self.epoch));
+        let event = match committed.first().filter(|_| std::mem::take(&mut self.damaged)) {
+            Some((part, ..)) => Event::PixelsLost { job: JOB, part: *part, reason: "the checksum is wrong".into() },
+            None => Event::Assembled { job: JOB, result: Ok(()) },
+        };
+        self.plan(at, Happening::Farm(event, self.epoch));
+    }
+
+    /// Where every part was compared, no wrong pixels are in the picture.
+    fn judge_pixels(&mut self) {
+        let Some(record) = self.farm.record(JOB).filter(|_| self.scenario.job.audit >= 1.0) else { return };
+        let alone = |warning: &String| warning.contains("there is no third to decide") || warning.contains("no other node was there");
+        let wrong = record.parts.iter().find(|part| {
+            let [x, y, width, height] = part.rect;
+            let right: String = true_hash(Rect { x, y, width, height }).iter().map(|byte| format!("{byte:02x}")).collect();
+            part.hash.as_ref().is_some_and(|hash| *hash != right)
+        });
+        if let Some(part) = wrong.filter(|_| !record.warnings.iter().any(alone)) {
+            self.violation(format!("part {} has wrong pixels", part.id.0));
+        }
     }
 
     fn start(&mut self, node: usize) {
@@ -356,7 +418,7 @@ impl World {
         match fault {
             Fault::Start(node) => self.start(node),
             Fault::Kill(node) => {
-                if self.nodes[node].alive && self.nodes[node].paused.max(self.nodes[node].parted) <= self.now {
+                if self.nodes[node].alive && self.nodes[node].paused.max(self.nodes[node].mute) <= self.now {
                     self.killed.insert(node, self.now);
                 }
                 self.nodes[node].end();
@@ -369,7 +431,16 @@ impl World {
                 self.nodes[node].end();
             }
             Fault::Pause(node, length) => self.nodes[node].paused = self.now + length,
-            Fault::Partition(node, length) => self.nodes[node].parted = self.now + length.min(IDLE_TIMEOUT),
+            Fault::Partition(node, length) => {
+                self.fault(Fault::Deafen(node, length));
+                self.fault(Fault::Mute(node, length));
+            }
+            Fault::Deafen(node, length) => self.nodes[node].deaf = self.now + length.min(IDLE_TIMEOUT),
+            Fault::Mute(node, length) => self.nodes[node].mute = self.now + length.min(IDLE_TIMEOUT),
+            Fault::Hang(node) => self.nodes[node].hangs_next = true,
+            Fault::Corrupt(node) => self.nodes[node].corrupt = true,
+            Fault::DamagePixels => self.damaged = true,
+            Fault::Stall(length) => self.stalled = self.stalled.max(self.now + length),
             Fault::Slow(node, factor) => self.nodes[node].slowness = factor,
             Fault::FailPart(node) => self.nodes[node].fails_next = true,
             Fault::RestartCoordinator => self.restart(),

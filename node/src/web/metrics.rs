@@ -95,7 +95,7 @@ impl Default for Metrics {
             efficiency: Gauge::default(),
             overbalance: Gauge::default(),
         };
-        for outcome in [&Outcome::Finished, &Outcome::Failed { reason: String::new() }, &Outcome::Cancelled { reason: String::new() }] {
+        for outcome in [&Outcome::Finished, &Outcome::Incomplete { holes: 0 }, &Outcome::Failed { reason: String::new() }, &Outcome::Cancelled { reason: String::new() }] {
             drop(metrics.jobs_ended.get_or_create(&[("outcome", word(outcome))]));
         }
         metrics.register(&mut registry);
@@ -179,7 +179,8 @@ impl Metrics {
 fn standing(snapshot: &Snapshot) -> Registry {
     let mut registry = Registry::with_prefix("tessera");
     let (nodes, jobs) = (Family::<Label, Gauge>::default(), Family::<Label, Gauge>::default());
-    for state in [NodeState::Proving, NodeState::Ready, NodeState::Refused, NodeState::Suspected, NodeState::Lost] {
+    use NodeState::{Lost, Proving, Quarantined, Ready, Refused, Suspected};
+    for state in [Proving, Ready, Refused, Suspected, Lost, Quarantined] {
         let count = snapshot.nodes.iter().filter(|node| node.state == state).count();
         nodes.get_or_create(&[("state", node_word(state))]).set(signed(count));
     }
@@ -216,6 +217,7 @@ fn gauge(count: usize) -> Gauge {
 fn word(outcome: &Outcome) -> &'static str {
     match outcome {
         Outcome::Finished => "finished",
+        Outcome::Incomplete { .. } => "incomplete",
         Outcome::Failed { .. } => "failed",
         Outcome::Cancelled { .. } => "cancelled",
     }
@@ -228,6 +230,7 @@ fn node_word(state: NodeState) -> &'static str {
         NodeState::Refused => "refused",
         NodeState::Suspected => "suspected",
         NodeState::Lost => "lost",
+        NodeState::Quarantined => "quarantined",
     }
 }
 

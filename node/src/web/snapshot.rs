@@ -101,6 +101,7 @@ fn outcome(outcome: Option<Outcome>) -> String {
     match outcome {
         None => String::new(),
         Some(Outcome::Finished) => "finished".to_owned(),
+        Some(Outcome::Incomplete { holes }) => format!("incomplete: {holes} parts could not be rendered"),
         Some(Outcome::Failed { reason }) => format!("failed: {reason}"),
         Some(Outcome::Cancelled { reason }) => format!("cancelled: {reason}"),
     }

@@ -65,7 +65,7 @@ mod tests {
             finish: 0.0,
             probed: Vec::new(),
         };
-        let part = PartEntry { id: crate::schedule::PartId(0), rect: [0, 0, 8, 8], predicted: 3.0, planned: None, hash: None, attempts };
+        let part = PartEntry { id: crate::schedule::PartId(0), rect: [0, 0, 8, 8], predicted: 3.0, planned: None, hash: None, attempts, replaced_by: Vec::new() };
         JobRecord { nodes: vec![node], parts: vec![part], ..empty() }
     }
 
@@ -81,6 +81,7 @@ mod tests {
             split: schedule::Split::Strips { count: 1 },
             assign: schedule::Assign::Naive,
             min_nodes: 1,
+            audit: 0.0,
         };
         farm.step(std::time::Duration::ZERO, farm::Event::JobSubmitted { job: farm::JobId(1), spec });
         farm.record(farm::JobId(1)).unwrap()

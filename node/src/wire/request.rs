@@ -44,6 +44,11 @@ pub enum Request {
         /// The job.
         job: JobId,
     },
+    /// Let a node out of quarantine: [`Response::Done`].
+    Release {
+        /// Its name.
+        node: String,
+    },
 }
 
 /// The coordinator's answers.
@@ -179,12 +184,14 @@ pub enum JobState {
     Failed(String),
     /// It was not wanted any more.
     Cancelled(String),
+    /// Its files stand, but so many parts could not be rendered.
+    Incomplete(u32),
 }
 
 impl JobState {
     /// Whether nothing more will come.
     pub fn is_over(&self) -> bool {
-        matches!(self, Self::Finished | Self::Failed(_) | Self::Cancelled(_))
+        matches!(self, Self::Finished | Self::Failed(_) | Self::Cancelled(_) | Self::Incomplete(_))
     }
 }
 

@@ -20,7 +20,7 @@ use crate::{
 pub const FUNCTIONS: &[Function] = &[Function {
     path: "job",
     form: Form::Table,
-    keys: &["scene", "camera", "film", "render", "quality", "probe", "split", "assign", "output", "seed"],
+    keys: &["scene", "camera", "film", "render", "quality", "probe", "split", "assign", "output", "seed", "audit"],
     make: job,
 }];
 
@@ -34,6 +34,7 @@ const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure"];
 
 const EDGE: u32 = 65_536;
 const EXPOSURE: Range = Range { lowest: -100.0, highest: 100.0, open: false, words: "stops from -100 to 100" };
+const SHARE: Range = Range { lowest: 0.0, highest: 1.0, open: false, words: "a share from 0 to 1" };
 
 fn job(keys: &Keys) -> mlua::Result<Value> {
     let scene = keys.required("scene")?.thing("a scene (tessera.scene)", |handle| match &handle.thing {
@@ -59,7 +60,8 @@ fn job(keys: &Keys) -> mlua::Result<Value> {
     let assign = keys.or("assign", Policy::BuiltIn(Assign::EarliestFinish), |field| assign(&field))?;
     let output = output(keys)?;
     let seed = keys.or("seed", 0, |field| field.integer(0, 1 << 53))?;
-    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, seed };
+    let audit = keys.or("audit", 0.0, |field| field.number(SHARE))?;
+    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, seed, audit };
     keys.make(|_| Thing::Job(Arc::new(job)))
 }
 

@@ -32,6 +32,8 @@ pub enum Deed {
     Cancel,
     /// To remove a job that is over.
     Delete,
+    /// To let a node out of quarantine.
+    Release,
 }
 
 impl fmt::Display for Role {
@@ -54,6 +56,7 @@ impl fmt::Display for Deed {
             Self::Fetch => "fetch files of jobs",
             Self::Cancel => "cancel jobs",
             Self::Delete => "delete jobs",
+            Self::Release => "release nodes",
         })
     }
 }
@@ -73,7 +76,7 @@ impl Role {
         match (self, deed) {
             (Self::Operator, _) | (Self::Submitter | Self::Observer, Deed::Look) | (Self::Submitter, Deed::Submit) => true,
             (Self::Submitter, Deed::Fetch | Deed::Cancel | Deed::Delete) => own,
-            (Self::Observer, _) | (Self::Node | Self::Coordinator, _) => false,
+            (Self::Submitter, Deed::Release) | (Self::Observer, _) | (Self::Node | Self::Coordinator, _) => false,
         }
     }
 

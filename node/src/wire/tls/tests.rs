@@ -80,13 +80,14 @@ fn roles_may_do_what_the_guide_says() {
         (Deed::Fetch, false),
         (Deed::Cancel, true),
         (Deed::Cancel, false),
+        (Deed::Release, false),
     ];
     for (role, may) in [
-        (Role::Operator, [true, true, true, true, true, true]),
-        (Role::Submitter, [true, true, true, false, true, false]),
-        (Role::Observer, [true, false, false, false, false, false]),
-        (Role::Node, [false; 6]),
-        (Role::Coordinator, [false; 6]),
+        (Role::Operator, [true, true, true, true, true, true, true]),
+        (Role::Submitter, [true, true, true, false, true, false, false]),
+        (Role::Observer, [true, false, false, false, false, false, false]),
+        (Role::Node, [false; 7]),
+        (Role::Coordinator, [false; 7]),
     ] {
         assert_eq!(deeds.map(|(deed, own)| role.may(deed, own)), may, "{role}");
     }

@@ -1,0 +1,157 @@
+//! Parts are delivered and committed. A part is committed once, whoever else renders it too.
+
+use super::job::Job;
+use super::node::Nodes;
+use super::part::{Lease, PartState, Place, Role};
+use super::turn::Turn;
+use super::{Command, DiscardReason, Farm, Incarnation, JobId, LeaseId, ToNode};
+use crate::manifest::AttemptOutcome;
+use crate::schedule::{NodeId, PartId};
+
+/// Pixels that a node hands in; the shell holds them.
+#[derive(Clone, Copy)]
+pub(super) struct Delivery {
+    pub node: NodeId,
+    pub incarnation: Incarnation,
+    pub lease: LeaseId,
+    pub hash: [u8; 32],
+    pub seconds: f64,
+}
+
+impl Farm {
+    /// A node delivers a part. The shell must be told what becomes of its pixels.
+    pub(super) fn rendered(&mut self, job: JobId, delivery: Delivery) {
+        let alive = self.node_heard(delivery.node, delivery.incarnation);
+        let known = self.jobs.get_mut(&job).filter(|job| job.outcome().is_none());
+        let verdict = match known {
+            _ if !alive => Err(DiscardReason::Dead),
+            None => Err(DiscardReason::Unknown),
+            Some(job) => job.deliver(&mut self.turn, &self.nodes, delivery),
+        };
+        if let Err(reason) = verdict {
+            self.turn.put(Command::Discard { job, lease: delivery.lease, reason });
+        }
+        self.punish(job);
+    }
+}
+
+impl Job {
+    /// Takes the pixels of an attempt, if they are the first of their part.
+    fn deliver(&mut self, turn: &mut Turn, nodes: &Nodes, delivery: Delivery) -> Result<(), DiscardReason> {
+        let Delivery { node, incarnation, lease, hash, seconds } = delivery;
+        self.lane_is_free(turn, node, lease);
+        let Some(of) = self.leases.get(&lease).filter(|of| (of.node, of.incarnation) == (node, incarnation)) else {
+            return Err(self.why_unknown(lease));
+        };
+        let (part, now, is_audit) = (of.part, turn.now, self.part(of.part).is_delivered());
+        self.release_lease(turn, lease);
+        let state = self.part_mut(part);
+        state.votes.push((node, hash));
+        if let Some(attempt) = state.attempt_mut(lease) {
+            (attempt.end, attempt.seconds) = (Some(now), Some(seconds));
+        }
+        let cost = state.cost;
+        self.members.entry(node).and_modify(|member| member.note_pace(cost, seconds));
+        if is_audit {
+            self.compare(lease, part);
+            return Err(DiscardReason::Compared);
+        }
+        self.unplace(part);
+        self.loose.remove(&part);
+        self.committing.insert(lease, part);
+        self.part_mut(part).place = Place::Committing(lease);
+        self.cancel_attempts(turn, nodes, part, "another attempt was first");
+        self.choose_for_audit(part);
+        turn.put(Command::Commit { job: self.id, part, lease });
+        Ok(())
+    }
+
+    /// An attempt that is not open: its part was delivered by another (or by itself, twice), or it never was.
+    fn why_unknown(&self, lease: LeaseId) -> DiscardReason {
+        let tried = |part: &&PartState| part.attempts.iter().any(|attempt| attempt.lease == lease);
+        match self.parts.iter().find(tried) {
+            Some(part) if part.is_delivered() => DiscardReason::Committed,
+            _ => DiscardReason::Unknown,
+        }
+    }
+
+    /// The pixels of an attempt are on disk.
+    pub fn committed(&mut self, turn: &mut Turn, lease: LeaseId) {
+        let Some(id) = self.committing.remove(&lease) else { return };
+        let part = self.part_mut(id);
+        part.place = Place::Committed(lease);
+        let cost = part.cost;
+        if let Some(attempt) = part.attempt_mut(lease) {
+            attempt.outcome = AttemptOutcome::Committed;
+        }
+        self.committed += 1;
+        self.cost.1 += cost;
+        self.log.last_commit = Some(turn.now);
+    }
+
+    /// Calls back all open attempts at a part.
+    pub(super) fn cancel_attempts(&mut self, turn: &mut Turn, nodes: &Nodes, part: PartId, reason: &str) {
+        let open: Vec<LeaseId> = self.leases.iter().filter(|(_, lease)| lease.part == part).map(|(lease, _)| *lease).collect();
+        for lease in open {
+            self.call_back(turn, nodes, lease);
+            self.close(turn, lease, AttemptOutcome::Cancelled, reason);
+        }
+    }
+
+    /// Tells the node of an attempt to stop it.
+    pub(super) fn call_back(&mut self, turn: &mut Turn, nodes: &Nodes, lease: LeaseId) {
+        if let Some(of) = self.leases.get(&lease)
+            && let Some(node) = nodes.get(&of.node).filter(|node| node.lives(of.incarnation))
+        {
+            turn.send(of.node, node, ToNode::Cancel { job: self.id, lease });
+        }
+    }
+
+    /// An attempt is over without a result.
+    pub(super) fn close(&mut self, turn: &mut Turn, lease: LeaseId, outcome: AttemptOutcome, reason: &str) {
+        if let Some(of) = self.release_lease(turn, lease) {
+            self.part_mut(of.part).end_attempt(lease, turn.now, outcome, reason);
+            if of.role == Role::Audit {
+                self.audits.insert(of.part);
+            }
+        }
+    }
+
+    /// Takes an attempt off the books; the next one of its node can have begun now.
+    pub(super) fn release_lease(&mut self, turn: &Turn, lease: LeaseId) -> Option<Lease> {
+        let of = self.leases.remove(&lease)?;
+        if let Some(member) = self.members.get_mut(&of.node) {
+            member.held.retain(|held| *held != lease);
+        }
+        self.note_begun(turn, of.node);
+        Some(of)
+    }
+
+    /// An attempt does not count any more, but may still end well. Its part goes to another, unless one is at it already.
+    pub(super) fn set_aside(&mut self, lease: LeaseId) {
+        let Some(of) = self.leases.get_mut(&lease) else { return };
+        let (part, role, node) = (of.part, std::mem::replace(&mut of.role, Role::Stray), of.node);
+        if let Some(member) = self.members.get_mut(&node) {
+            member.held.retain(|held| *held != lease);
+        }
+        match role {
+            Role::Main => self.loosen(part),
+            Role::Audit => _ = self.audits.insert(part),
+            Role::Spare | Role::Stray => {}
+        }
+    }
+
+    /// The main attempt at a part is gone: its spare one takes over, or it has no node.
+    pub(super) fn loosen(&mut self, part: PartId) {
+        let spare = self.leases.iter_mut().find(|(_, lease)| lease.part == part && lease.role == Role::Spare);
+        match spare {
+            Some((id, lease)) => {
+                lease.role = Role::Main;
+                let id = *id;
+                self.loose.remove(&part);
+                self.part_mut(part).place = Place::Leased(id);
+            }
+            None => self.unplace(part),
+        }
+    }
+}

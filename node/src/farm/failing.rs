@@ -1,0 +1,90 @@
+//! Parts that nodes cannot render, or die of.
+//!
+//! A part that failed on several nodes is cut into quarters; a piece of it that fails is cut again at once, until what is left is small. What then
+//! fails on several nodes still is left out: the rest of the picture is delivered, with a hole that is marked and reported.
+
+use super::job::Job;
+use super::node::Nodes;
+use super::part::{Place, Role};
+use super::tail::cut_up;
+use super::turn::Turn;
+use super::{LeaseId, Outcome};
+use crate::limits::{FAILURES_PER_PART, HOLE_EDGE, NARROWED_PER_JOB};
+use crate::manifest::{AttemptOutcome, EventKind};
+use crate::schedule::{NodeId, PartId};
+
+impl Job {
+    /// A node could not render a part: others try.
+    pub fn render_failed(&mut self, turn: &mut Turn, nodes: &Nodes, node: NodeId, lease: LeaseId, reason: &str) {
+        self.lane_is_free(turn, node, lease);
+        let Some(of) = self.leases.get(&lease).filter(|of| of.node == node) else { return };
+        let (part, role) = (of.part, of.role);
+        self.close(turn, lease, AttemptOutcome::Failed, reason);
+        self.part_mut(part).failures.push((node, reason.to_owned()));
+        if role == Role::Main {
+            self.loosen(part);
+            self.log.event(turn.now, EventKind::Reassigned, Some(node), vec![part], format!("failed: {reason}"));
+        }
+        self.consider_failures(turn, nodes, part);
+    }
+
+    /// Cuts a part up, or gives it up, if it has failed too often.
+    pub(super) fn consider_failures(&mut self, turn: &mut Turn, nodes: &Nodes, id: PartId) {
+        let part = self.part(id);
+        let small = part.rect.width <= HOLE_EDGE && part.rect.height <= HOLE_EDGE;
+        let enough = if part.suspect && !small { 1 } else { FAILURES_PER_PART };
+        if part.is_delivered() || part.is_settled() || part.failures.len() < enough {
+            return;
+        }
+        let quarters = cut_up(part.rect, 4, HOLE_EDGE.div_ceil(2));
+        self.narrowed += 1;
+        if self.narrowed > NARROWED_PER_JOB {
+            let reason = format!("{NARROWED_PER_JOB} parts could not be rendered: {}", self.first_failures());
+            return self.end(turn, nodes, Outcome::Failed { reason });
+        }
+        self.cancel_attempts(turn, nodes, id, "its part failed on others");
+        let first = PartId(self.parts.len() as u32);
+        if !small && self.replace(turn, id, &quarters, "because it failed") {
+            self.parts[first.0 as usize..].iter_mut().for_each(|piece| piece.suspect = true);
+        } else {
+            self.give_up(turn, id);
+        }
+    }
+
+    fn give_up(&mut self, turn: &Turn, id: PartId) {
+        self.unplace(id);
+        self.loose.remove(&id);
+        self.part_mut(id).place = Place::Hole;
+        self.dropped += 1;
+        let why = self.told_failures(id);
+        self.log.warn(format!("the picture has a hole: {why}"));
+        self.log.event(turn.now, EventKind::LeftOut, None, vec![id], why);
+    }
+
+    /// The failures of the first part that has any.
+    pub(super) fn first_failures(&self) -> String {
+        let first = self
+            .parts
+            .iter()
+            .find(|part| part.failures.len() >= FAILURES_PER_PART)
+            .or_else(|| self.parts.iter().find(|part| !part.failures.is_empty()));
+        first.map_or_else(|| "nobody says why".to_owned(), |part| self.told_failures(part.id))
+    }
+
+    fn told_failures(&self, id: PartId) -> String {
+        let name = |id: &NodeId| self.members.get(id).map_or_else(|| format!("node {}", id.0), |member| member.info.name.clone());
+        let state = self.part(id);
+        let reasons: Vec<String> = state.failures.iter().map(|(node, reason)| format!("{}: {reason}", name(node))).collect();
+        let r = state.rect;
+        format!(
+            "part {} (x = {}, y = {}, width = {}, height = {}) failed {} times: {}",
+            id.0,
+            r.x,
+            r.y,
+            r.width,
+            r.height,
+            reasons.len(),
+            reasons.join("; ")
+        )
+    }
+}
