@@ -99,6 +99,7 @@ impl Job {
         }
         gathering.until = None;
         if prepared == 0 {
+            gathering.grace = None; // whoever was prepared is gone
             if preparing == 0 && stages.len() >= self.spec.min_nodes as usize {
                 self.fail_if_nobody_can(turn, nodes);
             }

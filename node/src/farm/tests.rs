@@ -219,6 +219,20 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
     assert_eq!(bench.count(EventKind::Lost), 0);
 }
 
+/// Two nodes are asked for, the prepared one dies while the other one still compiles: nothing is due before that one answers.
+#[test]
+fn a_prepared_node_that_dies_takes_its_deadline_with_it() {
+    let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
+    bench.does(Event::JobSubmitted { job: JOB, spec: spec(Assign::Paper, 2) });
+    (0..2).for_each(|node| bench.ready(node, 1));
+    bench.prepared(0, 1);
+    bench.does(Event::NodeLeft { node: NodeId(0), incarnation: Incarnation(1), reason: "bye".into() });
+    bench.passes(6.0, &[1]);
+    assert_eq!(bench.count(EventKind::ProbeStarted) + bench.count(EventKind::RenderStarted), 0);
+    bench.prepared(1, 1);
+    assert_eq!(bench.count(EventKind::ProbeStarted), 1);
+}
+
 #[test]
 fn jobs_run_one_after_the_other_and_cancelling_releases_everything() {
     let mut bench = Bench::new(1, Assign::Paper);
