@@ -16,32 +16,21 @@ use super::{
     asked::Asked,
     canary::Canary,
     disk::Disk,
-    input::{Input, LinkId, Outgoing},
+    input::{Input, LinkId},
     jobs::{Known, Unanswered},
     leases::Lease,
+    links::Link,
     policy::Thinker,
     status::{self, Times},
 };
 use crate::{
     error::Result,
-    farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId, NodeInfo},
-    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL, TWIN_SILENCE},
+    farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId},
+    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
     schedule::NodeId,
     web::Snapshot,
-    wire::{FromNode, Hello, PartHeader, Status, ToNode},
+    wire::{FromNode, PartHeader, Status, ToNode},
 };
-
-/// A node's latest connection.
-pub struct Link {
-    id: LinkId,
-    incarnation: Incarnation,
-    address: String,
-    outgoing: mpsc::Sender<Outgoing>,
-    /// When it last gave a sign of life, and whether it was suspected or given up since.
-    heard: Instant,
-    suspected: bool,
-    dead: bool,
-}
 
 /// Pixels that came in.
 pub struct Arrived {
@@ -49,13 +38,6 @@ pub struct Arrived {
     bytes: Vec<u8>,
     length: usize,
     at: Instant,
-}
-
-impl Link {
-    /// Whether the process at its other end lives, beyond doubt.
-    fn lives(&self) -> bool {
-        !self.outgoing.is_closed() && self.heard.elapsed() < TWIN_SILENCE
-    }
 }
 
 /// The core and what stands around it.
@@ -270,15 +252,8 @@ impl Core {
         }
     }
 
-    fn release(&mut self, name: &str) -> std::result::Result<(), String> {
-        let held = |node: &farm::NodeSnapshot| node.name == name && node.state == farm::NodeState::Quarantined;
-        let node = self.farm.nodes().into_iter().find(held).ok_or_else(|| format!("no node {name} is in quarantine"))?;
-        self.step(Event::NodeReleased { node: node.id });
-        Ok(())
-    }
-
     /// The node at the other end of a connection, if that is still the connection of this node.
-    fn at(&self, link: LinkId) -> Option<(NodeId, Incarnation)> {
+    pub(super) fn at(&self, link: LinkId) -> Option<(NodeId, Incarnation)> {
         let node = *self.nodes.get(&link)?;
         self.links.get(&node).filter(|latest| latest.id == link).map(|latest| (node, latest.incarnation))
     }
@@ -290,37 +265,6 @@ impl Core {
         }
         if let Some(event) = act(self, node, incarnation) {
             self.step(event);
-        }
-    }
-
-    fn joined(&mut self, id: LinkId, name: String, hello: Hello, address: String, outgoing: mpsc::Sender<Outgoing>) {
-        let next = NodeId(u32::try_from(self.ids.len()).unwrap_or(u32::MAX));
-        let node = *self.ids.entry(name.clone()).or_insert(next);
-        let incarnation = hello.incarnation;
-        if let Some(twin) = self.links.get(&node).filter(|link| link.incarnation != incarnation && link.lives()) {
-            let reason = format!(
-                "another process with the key of {name} is connected, from {}: give each process a key of its own, or end one of them",
-                twin.address
-            );
-            self.shared.metrics.refused_peers.inc();
-            tracing::warn!(node = name, address, reason, "a node is turned away");
-            let _ = outgoing.try_send(Outgoing::Close(reason));
-            return;
-        }
-        tracing::info!(node = name, address, lanes = hello.lanes, build = hello.build, "a node joined");
-        if self.links.get(&node).is_none_or(|link| link.incarnation != incarnation) {
-            self.asked.forget_node(node);
-        }
-        self.nodes.insert(id, node);
-        let link = Link { id, incarnation, outgoing, address: address.clone(), heard: Instant::now(), suspected: false, dead: false };
-        if self.links.insert(node, link).is_some_and(|earlier| earlier.incarnation != incarnation && !earlier.dead) {
-            self.shared.metrics.deaths.inc();
-        }
-        let info = NodeInfo { name, lanes: hello.lanes, build: hello.build, address };
-        self.step(Event::NodeJoined { node, incarnation, info });
-        if hello.revision != tessera_engine::REVISION {
-            let reason = format!("its engine has revision {}, the coordinator's {}", hello.revision, tessera_engine::REVISION);
-            self.step(Event::NodeProved { node, incarnation, verdict: Err(reason) });
         }
     }
 
@@ -370,16 +314,6 @@ impl Core {
         Some(Event::Rendered { node, incarnation, job, lease, hash, seconds })
     }
 
-    /// A node that said goodbye, or was sent away, has left. One whose connection broke is only silent: it may come back with what it holds.
-    fn gone(&mut self, link: LinkId, left: Option<String>) {
-        let latest = self.at(link);
-        self.nodes.remove(&link);
-        if let (Some((node, incarnation)), Some(reason)) = (latest, left) {
-            self.links.remove(&node);
-            self.step(Event::NodeLeft { node, incarnation, reason });
-        }
-    }
-
     pub(super) fn step(&mut self, event: Event) {
         let now = self.offset + self.begin.elapsed();
         self.changed |= !matches!(event, Event::NodeHeard { .. });
@@ -391,17 +325,6 @@ impl Core {
                 self.sent_away(*node, *incarnation, silence);
             }
             self.carry_out(command);
-        }
-    }
-
-    /// A node is sent away: it was silent for too long, may not render, or has a newer life.
-    fn sent_away(&mut self, node: NodeId, incarnation: Incarnation, silence: bool) {
-        let latest = self.links.get_mut(&node).filter(|link| link.incarnation == incarnation);
-        if silence {
-            self.shared.metrics.deaths.inc();
-            latest.into_iter().for_each(|link| link.dead = true);
-        } else if latest.is_some() {
-            self.shared.metrics.refused_peers.inc();
         }
     }
 
@@ -458,26 +381,6 @@ impl Core {
             farm::ToNode::Cancel { job, lease } => ToNode::Cancel { job, lease },
             farm::ToNode::Release { job } => ToNode::Release { job },
         })
-    }
-
-    fn link_of(&mut self, node: NodeId, incarnation: Incarnation) -> Option<&mut Link> {
-        self.links.get_mut(&node).filter(|link| link.incarnation == incarnation)
-    }
-
-    fn say(&mut self, node: NodeId, incarnation: Incarnation, message: ToNode) {
-        self.asked.note(node, &message);
-        let Some(link) = self.link_of(node, incarnation) else { return };
-        if link.outgoing.try_send(Outgoing::Say(message)).is_err() {
-            tracing::debug!(node = node.0, "a message could not be handed to its connection");
-        }
-    }
-
-    fn close(&mut self, node: NodeId, incarnation: Incarnation, reason: String) {
-        let name = self.ids.iter().find(|(_, id)| **id == node).map_or("?", |(name, _)| name.as_str());
-        tracing::warn!(node = name, reason, "a node is sent away");
-        if let Some(link) = self.link_of(node, incarnation) {
-            let _ = link.outgoing.try_send(Outgoing::Close(reason));
-        }
     }
 
     /// The node may forget an attempt.

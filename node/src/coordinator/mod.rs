@@ -12,6 +12,7 @@ mod jobs;
 mod join;
 mod kept;
 mod leases;
+mod links;
 mod policy;
 mod quota;
 mod register;

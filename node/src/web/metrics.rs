@@ -95,7 +95,12 @@ impl Default for Metrics {
             efficiency: Gauge::default(),
             overbalance: Gauge::default(),
         };
-        for outcome in [&Outcome::Finished, &Outcome::Incomplete { holes: 0 }, &Outcome::Failed { reason: String::new() }, &Outcome::Cancelled { reason: String::new() }] {
+        for outcome in [
+            &Outcome::Finished,
+            &Outcome::Incomplete { holes: 0 },
+            &Outcome::Failed { reason: String::new() },
+            &Outcome::Cancelled { reason: String::new() },
+        ] {
             drop(metrics.jobs_ended.get_or_create(&[("outcome", word(outcome))]));
         }
         metrics.register(&mut registry);

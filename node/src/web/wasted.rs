@@ -65,7 +65,15 @@ mod tests {
             finish: 0.0,
             probed: Vec::new(),
         };
-        let part = PartEntry { id: crate::schedule::PartId(0), rect: [0, 0, 8, 8], predicted: 3.0, planned: None, hash: None, attempts, replaced_by: Vec::new() };
+        let part = PartEntry {
+            id: crate::schedule::PartId(0),
+            rect: [0, 0, 8, 8],
+            predicted: 3.0,
+            planned: None,
+            hash: None,
+            attempts,
+            replaced_by: Vec::new(),
+        };
         JobRecord { nodes: vec![node], parts: vec![part], ..empty() }
     }
 
