@@ -7,7 +7,7 @@ use std::time::Duration;
 use tessera_node::farm::Outcome;
 use tessera_node::manifest::{AttemptOutcome, EventKind};
 use tessera_node::schedule::{Assign, Probe, Split};
-use tessera_node::simulate::{Fault, Poison, Run, Scenario, World};
+use tessera_node::simulate::{Campaign, Fault, Poison, Run, Scenario, World, broken_by, shrink};
 
 const SCHEDULES: u64 = 10_000;
 
@@ -31,83 +31,38 @@ fn farm_of_15() -> Vec<(u32, f64)> {
     (0..15).map(|i| (1 + i % 2, 0.5 + f64::from(i * 7 % 15) / 14.0 * 0.75)).collect()
 }
 
-/// What happened in many schedules: how often each kind of thing that they are for.
-#[derive(Default)]
-struct Tally {
-    broken: Vec<String>,
-    finished: usize,
-    attempts_lost: usize,
-    events: std::collections::BTreeMap<String, usize>,
-}
-
-impl Tally {
-    fn of(seeds: impl Iterator<Item = u64>) -> Self {
-        seeds.map(Self::of_one).fold(Self::default(), Self::with)
-    }
-
-    fn of_one(seed: u64) -> Self {
-        let scenario = Scenario::chaos(seed);
-        let run = World::new(scenario.clone()).run();
-        let cancelled = scenario.faults.iter().any(|(_, fault)| *fault == Fault::Cancel);
-        let mut tally = Self::default();
-        match &run.outcome {
-            _ if !run.violations.is_empty() => tally.broken.push(format!("{seed}: {}", run.violations.join("; "))),
-            Some(Outcome::Finished) => tally.finished = 1,
-            Some(Outcome::Incomplete { holes: 1 }) if scenario.poison.is_some() => tally.finished = 1,
-            Some(Outcome::Cancelled { .. }) if cancelled => {}
-            outcome => tally.broken.push(format!("{seed}: {outcome:?}")),
-        }
-        tally.attempts_lost = run.attempts(AttemptOutcome::Lost) + run.attempts(AttemptOutcome::Cancelled);
-        run.record.events.iter().for_each(|event| *tally.events.entry(format!("{:?}", event.kind)).or_default() += 1);
-        tally
-    }
-
-    fn with(mut self, other: Self) -> Self {
-        self.broken.extend(other.broken);
-        self.finished += other.finished;
-        self.attempts_lost += other.attempts_lost;
-        other.events.into_iter().for_each(|(kind, count)| *self.events.entry(kind).or_default() += count);
-        self
-    }
-}
-
 #[test]
 fn no_schedule_loses_a_part_or_commits_one_twice() {
     let seeds = number("TESSERA_SEED").map_or(0..number("TESSERA_SCHEDULES").unwrap_or(SCHEDULES), |seed| seed..seed + 1);
-    let many = seeds.end - seeds.start >= SCHEDULES;
-    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as u64;
-    let tally = std::thread::scope(|scope| {
-        let share = |thread: u64| seeds.clone().filter(move |seed| seed % threads == thread);
-        let workers: Vec<_> = (0..threads).map(share).map(|seeds| scope.spawn(move || Tally::of(seeds))).collect();
-        workers.into_iter().map(|worker| worker.join().unwrap()).fold(Tally::default(), Tally::with)
-    });
-    println!("{} finished, {} attempts lost or called back; {:?}", tally.finished, tally.attempts_lost, tally.events);
-    let shown: Vec<_> = tally.broken.iter().take(20).map(String::as_str).collect();
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let campaign = Campaign::run(&seeds, threads as u64);
+    println!("{} finished, {} attempts lost or called back; {:?}", campaign.finished, campaign.attempts_lost, campaign.events);
+    let shown: Vec<_> = campaign.broken.iter().take(20).map(|(seed, what)| format!("{seed}: {what}")).collect();
     assert!(
         shown.is_empty(),
         "{} schedules went wrong:\n{}\nreplay one: tessera simulate --schedule NUMBER",
-        tally.broken.len(),
+        campaign.broken.len(),
         shown.join("\n")
     );
-    if many {
+    if seeds.end - seeds.start >= SCHEDULES {
         // The schedules are worth their time only if what they are for happens in them.
-        let wanted = [
-            "Lost",
-            "Suspected",
-            "Recovered",
-            "Reassigned",
-            "PolicyReplaced",
-            "Overdue",
-            "Speculated",
-            "Cut",
-            "LeftOut",
-            "Quarantined",
-            "Revoked",
-        ];
-        let rare: Vec<_> = wanted.iter().filter(|kind| tally.events.get(**kind).is_none_or(|count| *count < 100)).collect();
+        let wanted = ["Lost", "Suspected", "Recovered", "Reassigned", "PolicyReplaced", "Overdue", "Speculated"];
+        let wanted = wanted.into_iter().chain(["Cut", "LeftOut", "Quarantined", "Revoked"]);
+        let rare: Vec<_> = wanted.filter(|kind| campaign.events.get(*kind).is_none_or(|count| *count < 100)).collect();
         assert!(rare.is_empty(), "hardly ever: {rare:?}");
-        assert!(tally.finished > SCHEDULES as usize * 9 / 10);
+        assert!(campaign.finished > SCHEDULES * 9 / 10);
     }
+}
+
+/// A job that all nodes leave for ever is broken for the judge: the one fault that does it is found among others.
+#[test]
+fn a_broken_schedule_shrinks_to_what_breaks_it() {
+    let mut scenario = Scenario::plain(21, &[(1, 1.0)], grid(128), Assign::Paper);
+    let at = Duration::from_secs;
+    scenario.faults =
+        vec![(at(1), Fault::Pause(0, at(2))), (at(5), Fault::Kill(0)), (at(2), Fault::FailPart(0)), (at(3), Fault::Slow(0, 1.5))];
+    assert!(broken_by(&scenario, &World::new(scenario.clone()).run()).is_some_and(|what| what.contains("all nodes died")));
+    assert_eq!(shrink(scenario).faults, [(at(5), Fault::Kill(0))]);
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod status;
 mod submit;
 mod tradeoff;
 mod verify;
+mod verify_farm;
 mod watch;
 
 use std::process;
@@ -81,7 +82,7 @@ enum Command {
     Report(report::Args),
     /// Runs the farm's scheduler on virtual time: plans a farm, or replays a schedule of faults.
     Simulate(simulate::Args),
-    /// Checks a picture against its manifest.
+    /// Checks a picture against its manifest, or the farm against its promises.
     Verify(verify::Args),
 }
 

@@ -6,7 +6,7 @@ use crate::error::{Error, ExitCode, Result};
 use crate::farm::Outcome;
 use crate::manifest::EventKind;
 use crate::schedule::{Assign, Split};
-use crate::simulate::{Fault, Run, Scenario, World};
+use crate::simulate::{Fault, Run, Scenario, World, broken_by, shrink};
 
 /// Arguments of `tessera simulate`.
 #[derive(clap::Args)]
@@ -78,14 +78,16 @@ pub fn run(args: Args) -> Result<()> {
 fn replay(seed: u64) -> Result<()> {
     let scenario = Scenario::chaos(seed);
     println!("{scenario:#?}");
-    let run = World::new(scenario).run();
+    let run = World::new(scenario.clone()).run();
     for event in &run.record.events {
         let node = event.node.map_or(String::new(), |node| format!(" node {}", node.0));
         println!("{:9.3} s {:?}{node} {} ({} parts)", event.time, event.kind, event.detail, event.parts.len());
     }
     run.record.warnings.iter().for_each(|warning| println!("warning: {warning}"));
     println!("{} after {:.3} s, {} steps; trace {}", told(run.outcome.as_ref()), run.record.seconds, run.steps, hex(&run.trace));
-    judge(&run)
+    let Some(broken) = broken_by(&scenario, &run) else { return Ok(()) };
+    println!("what it takes of its faults: {:?}", shrink(scenario).faults);
+    Err(Error::new(ExitCode::Internal, broken))
 }
 
 fn told(outcome: Option<&Outcome>) -> String {

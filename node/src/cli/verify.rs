@@ -1,4 +1,4 @@
-//! `tessera verify`: an output against its manifest.
+//! `tessera verify`: an output against its manifest, or the farm against its promises.
 
 use std::{
     io::ErrorKind,
@@ -12,6 +12,7 @@ use tessera_engine::{
     part::{Counters, Rect, RenderedPart},
 };
 
+use super::verify_farm;
 use crate::{
     error::{Error, ExitCode, Result},
     manifest::{self, Manifest, PartEntry, PixelType},
@@ -19,24 +20,42 @@ use crate::{
 
 const AGAIN: &str = "render it again: the bytes of a picture are the same every time";
 
-/// Checks a picture against its manifest: size, identity, every pixel, and every part.
+/// Checks a picture against its manifest: size, identity, every pixel, and every part. Or, with `farm`, the farm itself.
 #[derive(clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub struct Args {
+    #[command(subcommand)]
+    instead: Option<Instead>,
     /// The manifest, or the EXR beside which it stands.
-    #[arg(value_name = "MANIFEST|EXR")]
-    path: PathBuf,
+    #[arg(value_name = "MANIFEST|EXR", required = true)]
+    path: Option<PathBuf>,
     /// Prints the findings as JSON: a list of disagreements.
     #[arg(long)]
     json: bool,
 }
 
+/// What else can be verified.
+#[derive(clap::Subcommand)]
+enum Instead {
+    /// Lets the scheduler survive thousands of schedules of faults on virtual time, and measures how well.
+    Farm(verify_farm::Args),
+}
+
 /// Runs the subcommand.
 pub fn run(args: Args) -> Result<()> {
-    let path = manifest_beside(&args.path);
+    match (args.instead, args.path) {
+        (Some(Instead::Farm(farm)), _) => verify_farm::run(&farm),
+        (None, Some(path)) => picture(path, args.json),
+        (None, None) => Err(Error::new(ExitCode::Usage, "neither a picture nor its manifest is named")),
+    }
+}
+
+fn picture(named: PathBuf, json: bool) -> Result<()> {
+    let path = manifest_beside(&named);
     let manifest = manifest::read(&path)?;
-    let picture_path = match path == args.path {
+    let picture_path = match path == named {
         true => path.with_file_name(&manifest.image.exr),
-        false => args.path,
+        false => named,
     };
     let picture = exr::read(&picture_path).map_err(|error| match error.reason.kind() {
         ErrorKind::NotFound | ErrorKind::PermissionDenied => Error::new(ExitCode::File, error.to_string())
@@ -44,14 +63,14 @@ pub fn run(args: Args) -> Result<()> {
         _ => Error::new(ExitCode::Verify, format!("{} is damaged: {}", picture_path.display(), error.reason)).with_help(AGAIN),
     })?;
     let findings = disagreements(&manifest, &picture);
-    if args.json {
+    if json {
         println!("{}", serde_json::json!({ "picture": picture_path, "manifest": path, "disagreements": findings }));
     }
     if !findings.is_empty() {
         let message = format!("{} does not agree with {}:\n  {}", picture_path.display(), path.display(), findings.join("\n  "));
         return Err(Error::new(ExitCode::Verify, message).with_help(AGAIN));
     }
-    if !args.json {
+    if !json {
         println!("{} agrees with {}: {}", picture_path.display(), path.display(), agreed(&manifest));
     }
     Ok(())
@@ -168,7 +187,7 @@ mod tests {
     }
 
     fn verify(path: &Path) -> Result<()> {
-        run(Args { path: path.to_owned(), json: false })
+        picture(path.to_owned(), false)
     }
 
     #[test]
