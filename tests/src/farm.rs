@@ -4,7 +4,10 @@ use std::{
     io::{BufRead, BufReader, Read},
     path::{Path, PathBuf},
     process::{Child, Command, ExitStatus, Stdio},
-    sync::mpsc::{self, Receiver, RecvTimeoutError},
+    sync::{
+        Arc, Mutex,
+        mpsc::{self, Receiver, RecvTimeoutError},
+    },
     thread::{self, JoinHandle},
     time::{Duration, Instant},
 };
@@ -81,12 +84,15 @@ impl Program {
         let stdout = child.stdout.take().expect("a pipe");
         thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
         let mut stderr = child.stderr.take().expect("a pipe");
-        let errors = thread::spawn(move || {
-            let mut text = Vec::new();
-            let _ = stderr.read_to_end(&mut text);
-            String::from_utf8_lossy(&text).into_owned()
+        let complaints = Arc::new(Mutex::new(Vec::new()));
+        let heard = complaints.clone();
+        let listener = thread::spawn(move || {
+            let mut some = [0; 4096];
+            while let Ok(length @ 1..) = stderr.read(&mut some) {
+                heard.lock().expect("no panic").extend_from_slice(&some[..length]);
+            }
         });
-        Running { child, lines, errors: Some(errors), nodes: Vec::new(), said: Vec::new() }
+        Running { child, lines, complaints, listener: Some(listener), nodes: Vec::new(), said: Vec::new() }
     }
 
     /// A farm's keys in the folder `keys`, with an identity for each of these nodes.
@@ -136,7 +142,8 @@ impl Program {
 pub struct Running {
     child: Child,
     lines: Receiver<String>,
-    errors: Option<JoinHandle<String>>,
+    complaints: Arc<Mutex<Vec<u8>>>,
+    listener: Option<JoinHandle<()>>,
     nodes: Vec<(String, i32)>,
     said: Vec<String>,
 }
@@ -188,10 +195,7 @@ impl Running {
                 }
                 Err(RecvTimeoutError::Timeout) => panic!("the wanted line never came; these did: {:#?}", self.said),
                 Err(RecvTimeoutError::Disconnected) => {
-                    panic!(
-                        "the process ended without the wanted line; stderr: {}",
-                        self.errors.take().map_or(String::new(), |it| it.join().unwrap())
-                    )
+                    panic!("the process ended without the wanted line; stderr: {}", self.errors())
                 }
             }
         }
@@ -227,6 +231,25 @@ impl Running {
         })
     }
 
+    /// All that it said on stderr; it has ended.
+    fn errors(&mut self) -> String {
+        self.listener.take().into_iter().for_each(|listener| listener.join().unwrap_or_default());
+        String::from_utf8_lossy(&self.complaints.lock().expect("no panic")).into_owned()
+    }
+
+    /// Waits until it has said this on stderr.
+    pub fn wait_for_complaint(&self, said: &str) {
+        let begin = Instant::now();
+        loop {
+            let text = String::from_utf8_lossy(&self.complaints.lock().expect("no panic")).into_owned();
+            if text.contains(said) {
+                return;
+            }
+            assert!(begin.elapsed() < PATIENCE, "it never said {said:?}: {text}");
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
     /// Waits for the end.
     pub fn finish(mut self) -> Finished {
         let begin = Instant::now();
@@ -237,7 +260,7 @@ impl Running {
                 None => panic!("the process does not end"),
             }
         };
-        let errors = self.errors.take().map_or(String::new(), |errors| errors.join().unwrap_or_default());
+        let errors = self.errors();
         let mut lines = std::mem::take(&mut self.said);
         lines.extend(self.lines.iter());
         Finished { code: status.code(), lines, errors }

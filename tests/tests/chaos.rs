@@ -235,15 +235,12 @@ fn files_that_cannot_be_written_yet_lose_no_part() {
     fs::write(&files, "in the way").unwrap();
     let _node = program.node(&address, "keys/node-attic.pem");
     program.wait_for_status(&address, "keys", |status| status["jobs"][0]["committed"] == 48);
-    // Long enough for a first attempt; that there was one is seen below.
-    std::thread::sleep(Duration::from_millis(500));
+    coordinator.wait_for_complaint("until the disk takes its files");
     fs::remove_file(&files).unwrap();
     fs::create_dir(&files).unwrap();
     let watched = program.run(&[&["watch", &submitted.lines[0], "--quiet"][..], &access].concat());
     assert_eq!(watched.code, Some(0), "{}", watched.errors);
     assert!(fs::read(files.join("job.exr")).unwrap() == undisturbed(), "the EXR's bytes differ from those of an undisturbed run");
-    let log = coordinator.kill().errors;
-    assert!(log.contains("until the disk takes its files"), "{log}");
 }
 
 #[test]
@@ -253,8 +250,8 @@ fn a_node_of_another_farm_is_refused_and_both_say_why() {
     program.make_keys("other", &["stranger"]);
     let (coordinator, address) = program.coordinator("keys", &[]);
     let node = program.node(&address, "other/node-stranger.pem");
-    // Two attempts: then both sides have said what they have to say.
-    std::thread::sleep(Duration::from_millis(500));
+    node.wait_for_complaint("not connected");
+    coordinator.wait_for_complaint("a peer was refused");
     let status = program.wait_for_status(&address, "keys", |_| true);
     assert_eq!(status["nodes"].as_array().unwrap().len(), 0);
     let (node, coordinator) = (node.kill(), coordinator.kill());

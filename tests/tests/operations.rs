@@ -239,8 +239,7 @@ fn a_disk_that_was_full_for_a_while_loses_nothing() {
     let refused = run(&["submit", "job.lua"]);
     assert_eq!(refused.code, Some(5), "{}", refused.errors);
     assert!(refused.errors.contains("cannot write the journal"), "{}", refused.errors);
-    thread::sleep(Duration::from_millis(2500)); // it tries again, in vain
-    assert!(metric(&page, "tessera_disk_refusals_total") >= 2.0);
+    wait_for("it tries again, in vain", || metric(&page, "tessera_disk_refusals_total") >= 2.0);
     coordinator.may_write(None);
     wait_for("it goes on by itself", || get(&page, "/readyz").0.starts_with("HTTP/1.1 200"));
     let rendered = run(&["render", "job.lua", "-o", "out", "-q", "--set", "samples=1"]);
