@@ -20,6 +20,7 @@
 //! lanes = 8
 //! cache = "/var/cache/tessera"
 //! cache_bytes = 8589934592
+//! drain = 60
 //! ```
 
 use std::{
@@ -86,6 +87,8 @@ pub struct NodeConfig {
     pub cache: Option<PathBuf>,
     /// Bytes of fetched assets.
     pub cache_bytes: Option<u64>,
+    /// See `tessera node --drain`.
+    pub drain: Option<f64>,
 }
 
 impl Config {

@@ -26,6 +26,9 @@ pub const WATCHDOG_FEEDS: u32 = 4;
 /// How far rendering threads stand back behind others, the network's thread first of all.
 pub const LANE_NICENESS: i32 = 5;
 
+/// How long a node that is told to end may take to finish what its lanes render, if it is not told otherwise.
+pub const DRAIN_LIMIT: Duration = Duration::from_secs(60);
+
 /// Fetched assets that a node keeps, if it is not told otherwise.
 pub const CACHE_BYTES: u64 = 8 << 30;
 
@@ -222,7 +225,7 @@ pub const HEARTBEATS_PER_INTERVAL: u32 = 4;
 pub const SUBMITTER_BYTES: u64 = 64 << 30;
 
 /// Jobs of one submitter that wait or run.
-pub const JOBS_PER_SUBMITTER: usize = 200;
+pub const JOBS_PER_SUBMITTER: usize = 2_000;
 
 /// What an asset counts at the least against that.
 pub const ASSET_LEAST_BYTES: u64 = 4 << 10;
@@ -271,16 +274,34 @@ pub const PROBE_GRACE: Duration = Duration::from_secs(2);
 pub const NODES: usize = 20_000;
 
 /// Jobs that wait or run.
-pub const JOBS_WAITING: usize = 1_000;
+pub const JOBS_WAITING: usize = 4_000;
+
+/// Jobs that have begun and are not over: nodes hold their scenes in memory.
+pub const JOBS_AT_ONCE: usize = 8;
+
+/// Where submitters share: a job hands out one part in its turn, and one more for so many nodes.
+pub const NODES_PER_TURN: usize = 16;
+
+/// Ranks of jobs: from minus this to this.
+pub const PRIORITY: i32 = 100;
+
+/// Frames of one sequence.
+pub const FRAMES_PER_SEQUENCE: usize = 2_000;
+
+/// Seconds that a job may be told to wait for a node: a year.
+pub const LONGEST_PATIENCE: f64 = 365.0 * 86_400.0;
+
+/// Jobs that one job waits for.
+pub const JOBS_AWAITED: usize = 1_000;
 
 /// Jobs that are over and still known.
-pub const JOBS_KEPT: usize = 100;
+pub const JOBS_KEPT: usize = 1_000;
 
-/// Events in a journal beyond which it is begun anew once all its jobs are over: a bound of the time that a start takes.
+/// Events in a journal beyond which a snapshot of the farm takes their place: a bound of the time that a start takes.
 pub const JOURNAL_EVENTS: u64 = 100_000;
 
-/// How long a running farm has been without jobs before that: what clients and policies of the last one may still say comes sooner.
-pub const JOURNAL_REST: Duration = POLICY_PATIENCE.saturating_add(Duration::from_secs(60));
+/// Length of the journal's file above which room that a snapshot freed is given back to the disk.
+pub const JOURNAL_COMPACTED_BYTES: u64 = 256 << 20;
 
 /// Entries in the list of a job's events; later ones are counted, not listed.
 pub const EVENTS_PER_JOB: usize = 100_000;
@@ -304,8 +325,11 @@ pub const POLICY_PATIENCE: Duration = SCRIPT_TIME.saturating_add(POLICY_TIMEOUT)
 /// Parts of one job at the most.
 pub const PARTS_PER_JOB: usize = 200_000;
 
-/// Failures of a part, each on another node where there is one, after which it is cut up or left out.
-pub const FAILURES_PER_PART: usize = 3;
+/// Failures of a part, each on another node where there is one, after which it is cut up or left out, if the job does not say otherwise.
+pub const ATTEMPTS_PER_PART: u32 = 3;
+
+/// What a job may say.
+pub const MOST_ATTEMPTS_PER_PART: u32 = 100;
 
 /// Longest edge of a part that is left out of the picture rather than cut up again.
 pub const HOLE_EDGE: u32 = 8;

@@ -48,6 +48,9 @@
 ---@alias tessera.SplitFunction fun(frame: {width: integer, height: integer}, costs: tessera.Costs, nodes: tessera.Node[]): tessera.Rect[]
 ---@alias tessera.AssignFunction fun(parts: tessera.Part[], nodes: tessera.Node[]): table<integer, integer>
 
+---@alias tessera.SceneFunction fun(frame: integer): tessera.Scene
+---@alias tessera.CameraFunction fun(frame: integer): tessera.Camera
+
 ---@class tessera.Random
 local random = {}
 
@@ -70,10 +73,17 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@field pixel_type? "float"|"half" 32 or 16 bits a number in the EXR
 ---@field exposure? number brightness of the preview: radiance is multiplied by 2^exposure
 
+-- @api job: frames
+---@class tessera.Frames
+---@field first number number of the first frame
+---@field last number no frame has a higher number
+---@field step? number distance of the numbers
+---@field in_order? boolean whether each frame waits until the one before it is finished
+
 -- @api job
 ---@class tessera.JobKeys
----@field scene tessera.Scene what is there: tessera.scene
----@field camera? tessera.Camera from where it is seen: tessera.perspective
+---@field scene tessera.Scene|tessera.SceneFunction what is there: tessera.scene
+---@field camera? tessera.Camera|tessera.CameraFunction from where it is seen: tessera.perspective
 ---@field film tessera.Film size of the frame: below
 ---@field render? tessera.Integrator how light is followed
 ---@field quality? tessera.Quality how accurately: below
@@ -83,6 +93,9 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@field output? tessera.Output what is written: below
 ---@field seed? number chooses the sample pattern
 ---@field audit? number share of the parts that two nodes render, to compare their pixels
+---@field attempts? number how often a part may fail before it is cut up
+---@field patience? number seconds that the job waits for a node when there is none
+---@field frames? tessera.Frames|number[] the frames of a sequence
 
 ---What the script returns.
 ---@param keys tessera.JobKeys

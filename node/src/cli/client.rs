@@ -19,7 +19,7 @@ use crate::{
     farm::JobId,
     job::JobDescription,
     limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES, SILENCE_SAID_AFTER},
-    wire::{self, FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Refusal, Request, Response, Status, tls::Identity},
+    wire::{self, FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Place, Refusal, Request, Response, Status, Terms, tls::Identity},
 };
 
 /// How subcommands find their coordinator.
@@ -49,6 +49,27 @@ impl Access {
 /// In words, when it is none.
 pub fn job_number(text: &str) -> Result<u64, String> {
     text.parse().map_err(|_| "a job's number is expected, as `tessera submit` prints it and `tessera list` shows it".to_owned())
+}
+
+/// Jobs on the command line.
+#[derive(clap::Args)]
+pub struct Jobs {
+    /// Numbers of jobs, or ranges of them such as 12-36.
+    #[arg(required = true, value_name = "JOB", value_parser = job_range)]
+    jobs: Vec<(u64, u64)>,
+}
+
+impl Jobs {
+    /// Their numbers, in the order in which they were given.
+    pub fn numbers(&self) -> impl Iterator<Item = JobId> + '_ {
+        self.jobs.iter().flat_map(|(first, last)| *first..=*last).map(JobId)
+    }
+}
+
+fn job_range(text: &str) -> Result<(u64, u64), String> {
+    let (first, last) = text.split_once('-').unwrap_or((text, text));
+    let (first, last) = (job_number(first)?, job_number(last)?);
+    if first <= last { Ok((first, last)) } else { Err(format!("the range ends before it begins; {last}-{first} is meant, perhaps")) }
 }
 
 /// A connection to a coordinator.
@@ -85,8 +106,8 @@ impl Client {
     ///
     /// # Errors
     /// When the coordinator refuses the job or is lost.
-    pub async fn submit(&self, description: &JobDescription, assets: &MemoryAssets, min_nodes: u32) -> Result<JobId> {
-        let request = Request::Submit { description: Box::new(description.clone()), min_nodes };
+    pub async fn submit(&self, description: &JobDescription, assets: &MemoryAssets, terms: &Terms) -> Result<JobId> {
+        let request = Request::Submit { description: Box::new(description.clone()), terms: terms.clone() };
         let (mut send, mut receive) = self.request(&request).await?;
         let wanted = match self.response(&mut receive).await? {
             Response::Wanted(wanted) => wanted,
@@ -200,6 +221,18 @@ impl Client {
     /// When it neither runs nor waits, or the coordinator is lost.
     pub async fn cancel(&self, job: JobId) -> Result<()> {
         let (_send, mut receive) = self.request(&Request::Cancel { job }).await?;
+        match self.response(&mut receive).await? {
+            Response::Done => Ok(()),
+            other => Err(self.unexpected(&other)),
+        }
+    }
+
+    /// Gives a job another place in the queue.
+    ///
+    /// # Errors
+    /// When it neither runs nor waits, or the coordinator is lost.
+    pub async fn move_job(&self, job: JobId, place: Place) -> Result<()> {
+        let (_send, mut receive) = self.request(&Request::Move { job, place }).await?;
         match self.response(&mut receive).await? {
             Response::Done => Ok(()),
             other => Err(self.unexpected(&other)),

@@ -1,17 +1,16 @@
-//! `tessera delete`: removes a job that is over from the coordinator's disk.
+//! `tessera delete`: removes jobs that is over from the coordinator's disk.
 
 use super::{
-    client::{Access, job_number},
+    client::{Access, Jobs},
     runtime::{block_on, start_logs},
 };
-use crate::{error::Result, farm::JobId};
+use crate::error::Result;
 
 /// Arguments of `tessera delete`.
 #[derive(clap::Args)]
 pub struct Args {
-    /// The job's number.
-    #[arg(value_parser = job_number)]
-    job: u64,
+    #[command(flatten)]
+    jobs: Jobs,
     #[command(flatten)]
     access: Access,
 }
@@ -21,9 +20,11 @@ pub fn run(args: Args) -> Result<()> {
     start_logs("error");
     block_on(async {
         let client = args.access.connect().await?;
-        client.delete(JobId(args.job)).await?;
+        for job in args.jobs.numbers() {
+            client.delete(job).await?;
+            println!("job {} is deleted", job.0);
+        }
         client.close().await;
-        println!("job {} is deleted", args.job);
         Ok(())
     })
 }

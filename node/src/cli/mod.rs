@@ -19,11 +19,13 @@ mod local;
 mod node;
 mod plan;
 mod progress;
+mod queue;
 mod release;
 mod render;
 mod report;
 mod runtime;
 mod script;
+mod sequence;
 mod simulate;
 mod status;
 mod submit;
@@ -62,11 +64,17 @@ enum Command {
     Watch(watch::Args),
     /// Brings a job's files here.
     Fetch(fetch::Args),
-    /// Ends a job.
+    /// Ends jobs.
     Cancel(cancel::Args),
+    /// Lets jobs wait: nodes finish what they hold of them, and get nothing new.
+    Pause(queue::Args),
+    /// Lets jobs go on.
+    Resume(queue::Args),
+    /// Gives jobs another priority.
+    Rank(queue::RankArgs),
     /// Lists the jobs that a farm keeps, also those that are over.
     List(list::Args),
-    /// Removes a job that is over from the farm's disk.
+    /// Removes jobs that are over from the farm's disk.
     Delete(delete::Args),
     /// Lets a node out of quarantine that delivered wrong pixels.
     Release(release::Args),
@@ -96,6 +104,9 @@ fn run(command: Command) -> Result<()> {
         Command::Watch(args) => watch::run(args),
         Command::Fetch(args) => fetch::run(args),
         Command::Cancel(args) => cancel::run(args),
+        Command::Pause(args) => queue::pause(&args),
+        Command::Resume(args) => queue::resume(&args),
+        Command::Rank(args) => queue::rank(&args),
         Command::List(args) => list::run(args),
         Command::Delete(args) => delete::run(args),
         Command::Release(args) => release::run(args),

@@ -2,11 +2,14 @@
 
 use std::{io::Read, path::PathBuf, process, thread};
 
-use super::runtime::{start_logs, stop_on_signals};
+use super::{
+    render::seconds,
+    runtime::{count_signals, start_logs},
+};
 use crate::{
     config::{Config, required},
     error::{Error, ExitCode, Result},
-    limits::CACHE_BYTES,
+    limits::{CACHE_BYTES, DRAIN_LIMIT},
     supervisor,
     wire::tls::{Identity, Role},
     worker,
@@ -30,6 +33,9 @@ pub struct Args {
     /// Bytes of fetched assets [default: 8 GiB].
     #[arg(long, value_name = "BYTES")]
     cache_bytes: Option<u64>,
+    /// Seconds in which a node that is told to end (SIGTERM) finishes what its lanes render; told again it ends at once [default: 60].
+    #[arg(long, value_name = "SECONDS")]
+    drain: Option<f64>,
     /// Settings file; flags and environment go before it.
     #[arg(long, env = "TESSERA_CONFIG", value_name = "FILE")]
     config: Option<PathBuf>,
@@ -48,6 +54,7 @@ pub fn run(args: Args) -> Result<()> {
         lanes: args.lanes.or(file.lanes).unwrap_or_else(cores).max(1),
         cache: args.cache.or(file.cache),
         cache_bytes: args.cache_bytes.or(file.cache_bytes).unwrap_or(CACHE_BYTES),
+        drain: args.drain.or(file.drain).map_or(Ok(DRAIN_LIMIT), seconds)?,
     };
     if let Some(warning) = options.identity.warning() {
         tracing::warn!(warning, "renew this node's key");
@@ -55,10 +62,10 @@ pub fn run(args: Args) -> Result<()> {
     if args.with_parent {
         end_with_parent()?;
     }
-    let stop = stop_on_signals()?;
+    let told = count_signals()?;
     // Ready does not mean connected: a node outlives its coordinator, and waits for it.
     supervisor::ready();
-    worker::run(&options, stop)
+    worker::run(&options, told)
 }
 
 /// Cores that this process may use.

@@ -119,6 +119,7 @@ impl Progress {
                 (_, NodeState::Lost) => self.say(&format!("{}: lost: {}", node.name, node.reason)),
                 (_, NodeState::Refused) => self.say(&format!("{}: gets no work: {}", node.name, node.reason)),
                 (Some(NodeState::Suspected), NodeState::Ready) => self.say(&format!("{}: heard again", node.name)),
+                (_, NodeState::Draining) => self.say(&format!("{}: about to go; it finishes what its lanes render", node.name)),
                 (_, NodeState::Proving | NodeState::Ready) => {}
             }
         }

@@ -14,9 +14,10 @@ use super::{
     direct,
     local::LocalFarm,
     node::cores,
-    progress::{Progress, Show, event},
+    progress::{Show, event},
     runtime::{block_on, start_logs},
     script::Script,
+    sequence::{self, Standing, Submitted, each_frame},
 };
 use crate::{
     error::{Error, ExitCode, Result},
@@ -58,6 +59,8 @@ pub struct Args {
     #[arg(long, value_name = "SECONDS", default_value_t = NO_NODE_TIMEOUT.as_secs_f64())]
     no_node_timeout: f64,
     #[command(flatten)]
+    standing: Standing,
+    #[command(flatten)]
     show: Show,
 }
 
@@ -67,40 +70,38 @@ pub fn run(args: Args) -> Result<()> {
     let (loaded, scene) = args.script.load()?;
     check_writable(&args.output)?;
     if let Some(threads) = args.threads {
-        let files = direct::render(&loaded.description, &scene, threads, &args.output)?;
-        return show_files(args.show, &files);
+        return each_frame(&args.script, (loaded, scene), |loaded, scene| {
+            show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output)?)
+        });
     }
     drop(scene);
-    let progress = args.show.progress();
-    loaded.description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
-    let files = block_on(async {
+    block_on(async {
         match &args.coordinator {
-            Some(address) => on_farm(address, &args, &loaded, progress).await,
-            None => here(&args, &loaded, progress).await,
+            Some(address) => on_farm(address, &args, loaded).await,
+            None => here(&args, loaded).await,
         }
-    })?;
-    report(args.show, &files, &args.output, &loaded.description)
+    })
 }
 
-async fn on_farm(address: &str, args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec<PathBuf>> {
+async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
     let keys = args.keys.as_deref().ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
     let client = Client::connect(address, &Identity::load_client(keys)?).await?;
-    let files = follow(&client, loaded, args.min_nodes.unwrap_or(1), progress, &args.output).await?;
+    let done = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1)).await;
     client.close().await;
-    Ok(files)
+    done
 }
 
-async fn here(args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec<PathBuf>> {
+async fn here(args: &Args, loaded: LoadedJob) -> Result<()> {
     let lanes = args.lanes.unwrap_or_else(|| (cores() / args.nodes).max(1));
     let no_node_timeout = seconds(args.no_node_timeout)?;
     let farm = FarmConfig { no_node_timeout, ..FarmConfig::default() };
-    let mut local = LocalFarm::start(args.nodes, lanes, farm, &progress).await?;
+    let mut local = LocalFarm::start(args.nodes, lanes, farm, &args.show.progress()).await?;
     let client = local.client().await?;
-    let work = follow(&client, loaded, args.min_nodes.unwrap_or(args.nodes), progress, &args.output);
+    let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes));
     tokio::pin!(work);
-    let files = loop {
+    let done = loop {
         tokio::select! {
-            files = &mut work => break files?,
+            done = &mut work => break done,
             ended = local.node_ended() => {
                 let said = ended?;
                 if !args.show.quiet && !args.show.json {
@@ -111,7 +112,18 @@ async fn here(args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec
     };
     client.close().await;
     local.stop().await;
-    Ok(files)
+    done
+}
+
+/// Submits what a script says, shows how it fares, fetches its files.
+async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32) -> Result<()> {
+    let progress = args.show.progress();
+    let taken = |submitted: &Submitted, description: &JobDescription| {
+        description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
+        progress.submitted(submitted.job.0);
+    };
+    let jobs = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), taken).await?;
+    sequence::follow(client, &jobs, args.show, &args.output).await
 }
 
 /// A length of time given on the command line.
@@ -120,20 +132,6 @@ async fn here(args: &Args, loaded: &LoadedJob, progress: Progress) -> Result<Vec
 /// When it is none.
 pub fn seconds(number: f64) -> Result<Duration> {
     Duration::try_from_secs_f64(number).map_err(|error| Error::new(ExitCode::Usage, format!("{number} seconds: {error}")))
-}
-
-/// Submits a job, shows how it fares, fetches its files.
-async fn follow(client: &Client, loaded: &LoadedJob, min_nodes: u32, mut progress: Progress, output: &Path) -> Result<Vec<PathBuf>> {
-    let job = client.submit(&loaded.description, &loaded.assets, min_nodes).await?;
-    progress.submitted(job.0);
-    let state = client.watch(job, |job, nodes| progress.see(job, nodes)).await?;
-    progress.end();
-    let ended = outcome(state.clone());
-    if matches!(state, JobState::Finished | JobState::Incomplete(_)) {
-        let files = client.fetch(job, output).await?;
-        return ended.map(|()| files).map_err(|error| error.with_help(format!("what there is stands in {}", output.display())));
-    }
-    ended.map(|()| Vec::new())
 }
 
 /// An error for a job that did not end well.
@@ -164,9 +162,9 @@ pub fn check_writable(folder: &Path) -> Result<()> {
 }
 
 /// The report at the end. What the job's description warns of was said at the beginning, and is not said again.
-pub fn report(show: Show, files: &[PathBuf], folder: &Path, description: &JobDescription) -> Result<()> {
-    let mut manifest = manifest::read(&folder.join(&description.output.manifest))?;
-    manifest.warnings.retain(|warning| !description.warnings.contains(warning));
+pub fn report(show: Show, files: &[PathBuf], manifest: &Path, said: &[String]) -> Result<()> {
+    let mut manifest = manifest::read(manifest)?;
+    manifest.warnings.retain(|warning| !said.contains(warning));
     if show.json {
         event(&json!({ "event": "finished", "files": files, "report": manifest.report }));
     } else if !show.quiet {

@@ -58,18 +58,26 @@ pub async fn interrupted() {
     }
 }
 
-/// Turns true on Ctrl-C or SIGTERM.
+/// Counts how often this process was told to end, by Ctrl-C or SIGTERM.
 ///
 /// # Errors
 /// When the system gives no threads.
-pub fn stop_on_signals() -> Result<watch::Receiver<bool>> {
-    let (stop, stopped) = watch::channel(false);
+pub fn count_signals() -> Result<watch::Receiver<u32>> {
+    let (count, counted) = watch::channel(0);
     let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
     let listen = move || {
-        runtime.block_on(interrupted());
-        stop.send_replace(true);
+        runtime.block_on(async {
+            let (Ok(mut interrupt), Ok(mut terminate)) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate())) else { return };
+            loop {
+                tokio::select! {
+                    _ = interrupt.recv() => {}
+                    _ = terminate.recv() => {}
+                }
+                count.send_modify(|count| *count += 1);
+            }
+        });
     };
     thread::Builder::new().name("signals".to_owned()).spawn(listen).map_err(internal)?;
-    Ok(stopped)
+    Ok(counted)
 }

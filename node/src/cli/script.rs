@@ -1,12 +1,12 @@
 //! Job scripts on the command line.
 
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use tessera_engine::scene::Scene;
 
 use crate::{
     error::Result,
-    job::{self, LoadedJob},
+    job::{self, FRAME_PARAMETER, LoadedJob},
 };
 
 /// A job script and its parameters.
@@ -33,6 +33,21 @@ impl Script {
     /// # Errors
     /// [`crate::error::ExitCode::Script`], with the place in the script.
     pub fn load(&self) -> Result<(LoadedJob, Scene)> {
-        job::load(&self.path, &self.parameters.iter().cloned().collect())
+        job::load(&self.path, &self.parameters())
+    }
+
+    /// The same for one frame of a sequence.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_frame(&self, frame: u32) -> Result<(LoadedJob, Scene)> {
+        let mut parameters = self.parameters();
+        parameters.insert(FRAME_PARAMETER.to_owned(), frame.to_string());
+        job::load(&self.path, &parameters)
+    }
+
+    /// What was given with `--set`.
+    pub fn parameters(&self) -> BTreeMap<String, String> {
+        self.parameters.iter().cloned().collect()
     }
 }

@@ -46,7 +46,7 @@ fn print_tables(status: &Status) {
     let rows: Vec<_> = std::iter::once(heads(&["node", "lanes", "holds", "state", "address"])).chain(nodes).collect();
     lined_up(&rows).iter().for_each(|line| println!("{line}"));
     let jobs = status.jobs.iter().map(job);
-    let rows: Vec<_> = std::iter::once(heads(&["job", "number", "parts", "seconds", "state"])).chain(jobs).collect();
+    let rows: Vec<_> = std::iter::once(heads(&["job", "number", "of", "priority", "parts", "seconds", "state"])).chain(jobs).collect();
     println!();
     lined_up(&rows).iter().for_each(|line| println!("{line}"));
 }
@@ -55,6 +55,7 @@ fn node(node: &NodeStatus) -> Vec<String> {
     let state = match node.state {
         NodeState::Proving => "proving",
         NodeState::Ready => "ready",
+        NodeState::Draining => "draining",
         NodeState::Refused => "refused",
         NodeState::Suspected => "suspected",
         NodeState::Lost => "lost",
@@ -67,7 +68,10 @@ fn node(node: &NodeStatus) -> Vec<String> {
 fn job(job: &JobStatus) -> Vec<String> {
     let state = match &job.state {
         JobState::Failed(reason) | JobState::Cancelled(reason) => format!("{}: {reason}", word(&job.state)),
-        state => [Some(word(state)), job.trouble.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(": "),
+        state => {
+            [job.paused.then_some("paused"), Some(word(state)), job.trouble.as_deref()].into_iter().flatten().collect::<Vec<_>>().join(": ")
+        }
     };
-    vec![job.name.clone(), job.job.0.to_string(), format!("{}/{}", job.committed, job.parts), format!("{:.1}", job.seconds), state]
+    let (parts, seconds) = (format!("{}/{}", job.committed, job.parts), format!("{:.1}", job.seconds));
+    vec![job.name.clone(), job.job.0.to_string(), job.owner.clone(), job.priority.to_string(), parts, seconds, state]
 }

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use super::{
     client::Access,
     progress::Show,
-    render::{check_writable, outcome, report},
+    render::check_writable,
     runtime::{block_on, start_logs},
     script::Script,
+    sequence::{self, Standing, Submitted},
 };
-use crate::error::Result;
+use crate::{error::Result, job::JobDescription};
 
 /// Arguments of `tessera submit`.
 #[derive(clap::Args)]
@@ -28,10 +29,12 @@ pub struct Args {
     #[arg(long, short, default_value = ".", value_name = "DIR", requires = "wait")]
     output: PathBuf,
     #[command(flatten)]
+    standing: Standing,
+    #[command(flatten)]
     show: Show,
 }
 
-/// Runs `tessera submit`: prints the job's number.
+/// Runs `tessera submit`: prints the job's number, or those of all frames.
 pub fn run(args: Args) -> Result<()> {
     start_logs("error");
     let (loaded, scene) = args.script.load()?;
@@ -39,25 +42,20 @@ pub fn run(args: Args) -> Result<()> {
     if args.wait {
         check_writable(&args.output)?;
     }
-    let mut progress = args.show.progress();
-    loaded.description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
-    let files = block_on(async {
+    let progress = args.show.progress();
+    block_on(async {
         let client = args.access.connect().await?;
-        let job = client.submit(&loaded.description, &loaded.assets, args.min_nodes).await?;
-        if args.show.json {
-            progress.submitted(job.0);
-        } else {
-            println!("{}", job.0);
-        }
-        let mut files = None;
-        if args.wait {
-            let state = client.watch(job, |job, nodes| progress.see(job, nodes)).await?;
-            progress.end();
-            outcome(state)?;
-            files = Some(client.fetch(job, &args.output).await?);
-        }
+        let taken = |submitted: &Submitted, description: &JobDescription| {
+            description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
+            if args.show.json {
+                progress.submitted(submitted.job.0);
+            } else {
+                println!("{}", submitted.job.0);
+            }
+        };
+        let jobs = sequence::submit(&client, &args.script, loaded, args.standing.terms(args.min_nodes), taken).await?;
+        let done = if args.wait { sequence::follow(&client, &jobs, args.show, &args.output).await } else { Ok(()) };
         client.close().await;
-        Ok(files)
-    })?;
-    files.map_or(Ok(()), |files| report(args.show, &files, &args.output, &loaded.description))
+        done
+    })
 }

@@ -25,11 +25,11 @@ use super::{
 };
 use crate::{
     error::Result,
-    farm::{self, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId},
+    farm::{self, Build, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId},
     limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
     schedule::NodeId,
     web::Snapshot,
-    wire::{FromNode, PartHeader, Status, ToNode},
+    wire::{FromNode, PartHeader, Place, Status, ToNode},
 };
 
 /// Pixels that came in.
@@ -57,8 +57,6 @@ pub struct Core {
     pub(super) jobs: BTreeMap<JobId, Known>,
     /// Who waits to hear that a job is taken.
     pub(super) unanswered: Unanswered,
-    /// When a job last ended.
-    pub(super) last_end: Instant,
     /// Why the disk takes no events and pixels.
     pub(super) disk_trouble: Option<String>,
     /// Why there is no room for more jobs.
@@ -109,7 +107,6 @@ impl Core {
             ids,
             jobs,
             unanswered: BTreeMap::new(),
-            last_end: Instant::now(),
             disk_trouble: None,
             no_space: None,
             times: BTreeMap::new(),
@@ -134,7 +131,8 @@ impl Core {
                 self.step(Event::Committed { job: job.id, lease });
             }
         }
-        self.step(Event::Restarted);
+        let build = Build { revision: tessera_engine::REVISION, canary: self.canary.hash };
+        self.step(Event::Restarted { build });
         Ok(())
     }
 
@@ -225,16 +223,14 @@ impl Core {
                 }
                 self.step(event);
             }
-            Input::Submit { description, min_nodes, owner, limited, reply } => {
-                match self.submit(*description, min_nodes, &owner, limited) {
-                    Ok(job) => self.answer_when_taken(job, reply),
-                    Err(reason) => drop(reply.send(Err(reason))),
-                }
-            }
+            Input::Submit { description, terms, owner, limited, reply } => match self.submit(*description, terms, &owner, limited) {
+                Ok(job) => self.answer_when_taken(job, reply),
+                Err(reason) => drop(reply.send(Err(reason))),
+            },
             Input::Rest => {
                 // Who begins to look at the page sees soon how things stand.
                 self.changed = true;
-                self.rest();
+                self.shorten_journal();
             }
             Input::Taken(job) => {
                 // Whoever asked may have gone meanwhile.
@@ -242,13 +238,15 @@ impl Core {
             }
             Input::Delete { job, reply } => drop(reply.send(self.delete(job))),
             Input::Release { node, reply } => drop(reply.send(self.release(&node))),
-            Input::Cancel { job, reason, reply } => {
-                let running = self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none());
-                if running {
-                    self.step(Event::JobCancelled { job, reason });
-                }
-                let _ = reply.send(if running { Ok(()) } else { Err(format!("there is no job {} that runs or waits", job.0)) });
+            Input::Move { job, place, reason, reply } => {
+                let event = match place {
+                    Place::Paused => Event::JobPaused { job, reason },
+                    Place::Resumed => Event::JobResumed { job, reason },
+                    Place::Ranked(priority) => Event::JobRanked { job, priority },
+                };
+                let _ = reply.send(self.change_open(job, event));
             }
+            Input::Cancel { job, reason, reply } => drop(reply.send(self.change_open(job, Event::JobCancelled { job, reason }))),
         }
     }
 
@@ -273,15 +271,7 @@ impl Core {
             return Some(Event::NodeHeard { node, incarnation });
         }
         match message {
-            FromNode::Proof { hash } => {
-                let verdict = if hash == self.canary.hash {
-                    Ok(())
-                } else {
-                    Err("it renders the canary part to other bytes than the coordinator: its processor or its build computes differently"
-                        .to_owned())
-                };
-                Some(Event::NodeProved { node, incarnation, verdict })
-            }
+            FromNode::Proof { hash } => Some(Event::NodeProved { node, incarnation, canary: hash }),
             FromNode::Prepared { job, result } => Some(Event::Prepared { node, incarnation, job, result }),
             FromNode::Probed { job, cells } => Some(Event::Probed { node, incarnation, job, cells }),
             FromNode::Failed { job, lease, .. } if self.shared.leases.get(job, lease).is_none_or(|lease| lease.node != node) => {
@@ -295,6 +285,7 @@ impl Core {
                 self.shared.leases.remove_of(node, job, lease);
                 Some(Event::Stopped { node, incarnation, job, lease })
             }
+            FromNode::Draining => Some(Event::NodeDraining { node, incarnation }),
             // Its connection ends with it.
             FromNode::Goodbye { .. } => None,
         }

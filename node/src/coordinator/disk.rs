@@ -16,7 +16,7 @@ use super::input::Input;
 use crate::{
     error::{Error, ExitCode, Result},
     farm::{Event, Farm, FarmConfig, JobId, LeaseId},
-    journal::{Filter, Journal, renewed},
+    journal::{Filter, Journal},
     limits::{DISK_RETRY, JOURNAL_BATCH},
     schedule::PartId,
     web::Metrics,
@@ -28,13 +28,12 @@ enum Deed {
     Store(JobId, PartId, LeaseId, Vec<u8>),
     Then(Box<dyn FnOnce() + Send>),
     Forget(JobId),
-    Renew(Vec<(Duration, Event)>),
+    Renew(Box<Farm>),
 }
 
 /// The way to the journal. What waits there is bounded by what was handed out: pixels of the running job, and the events around them.
 pub struct Disk {
     deeds: Sender<Deed>,
-    config: FarmConfig,
     filter: Filter,
     metrics: Arc<Metrics>,
     /// For reading pixels back.
@@ -73,7 +72,7 @@ impl Disk {
     /// # Errors
     /// When the journal cannot be read, or another process holds it.
     pub fn open(folder: &Path, config: FarmConfig, inputs: InputSender<Input>, metrics: Arc<Metrics>) -> Result<(Self, Farm)> {
-        let (journal, recovered) = Journal::open(&folder.join("journal"), config.clone())?;
+        let (journal, recovered) = Journal::open(&folder.join("journal"), config)?;
         if recovered.events > 0 {
             tracing::info!(events = recovered.events, "the journal was replayed");
         }
@@ -83,7 +82,7 @@ impl Disk {
         thread.measure();
         let started = thread::Builder::new().name("journal".to_owned()).spawn(move || thread.run(&received));
         started.map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))?;
-        Ok((Self { deeds, config, filter: Filter::default(), metrics, pixels }, recovered.farm))
+        Ok((Self { deeds, filter: Filter::default(), metrics, pixels }, recovered.farm))
     }
 
     /// Notes an event that `farm` is about to take.
@@ -109,12 +108,9 @@ impl Disk {
         self.send(Deed::Forget(job));
     }
 
-    /// Begins the journal anew, if that can be while `farm` stands as it does; returns the farm that goes on from there.
-    pub fn renew(&self, farm: &Farm) -> Option<Farm> {
-        let (farm, entries) = renewed(farm, self.config.clone())?;
-        tracing::info!(events = entries.len(), "the journal is begun anew");
-        self.send(Deed::Renew(entries));
-        Some(farm)
+    /// Lets the journal begin with the farm as it stands, in place of all that was noted before.
+    pub fn renew(&self, farm: &Farm) {
+        self.send(Deed::Renew(Box::new(farm.clone())));
     }
 
     fn send(&self, deed: Deed) {
@@ -157,7 +153,7 @@ impl Writer {
                 }
                 Deed::Then(act) => then.push(act),
                 Deed::Forget(job) => over.push(job),
-                Deed::Renew(entries) => self.retry(|journal| journal.renew(&entries)),
+                Deed::Renew(farm) => self.retry(|journal| journal.renew(&farm)),
             }
         }
         self.retry(Journal::sync);

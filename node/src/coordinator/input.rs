@@ -8,7 +8,7 @@ use super::room::Taken;
 use crate::{
     farm::{Event, JobId, LeaseId},
     job::JobDescription,
-    wire::{FromNode, Hello, PartHeader, ToNode},
+    wire::{FromNode, Hello, PartHeader, Place, Terms, ToNode},
 };
 
 /// One connection of a node; later ones have higher numbers.
@@ -67,8 +67,8 @@ pub enum Input {
     Submit {
         /// The job.
         description: Box<JobDescription>,
-        /// Nodes to wait for.
-        min_nodes: u32,
+        /// How it stands in the queue.
+        terms: Terms,
         /// Who may fetch and cancel it.
         owner: String,
         /// Whether they may have so many jobs and no more.
@@ -90,6 +90,17 @@ pub enum Input {
         /// Its name.
         node: String,
         /// Whether it was there.
+        reply: oneshot::Sender<Result<(), String>>,
+    },
+    /// A client gives a job another place in the queue.
+    Move {
+        /// The job.
+        job: JobId,
+        /// Where to.
+        place: Place,
+        /// Who.
+        reason: String,
+        /// Whether there was such a job.
         reply: oneshot::Sender<Result<(), String>>,
     },
     /// A client ends a job.

@@ -1,6 +1,6 @@
 //! Jobs in the hands of the core's task: they are taken, their files are written, the disk holds them up, they end.
 
-use std::{collections::BTreeMap, sync::Arc, thread, time::Instant};
+use std::{collections::BTreeMap, collections::BTreeSet, sync::Arc, thread, time::Instant};
 
 use tokio::sync::oneshot;
 
@@ -16,7 +16,8 @@ use super::{
 use crate::{
     farm::{Event, JobId, JobSnapshot, Outcome},
     job::JobDescription,
-    limits::{DISK_RETRY, JOBS_PER_SUBMITTER, JOURNAL_EVENTS, JOURNAL_REST},
+    limits::{DISK_RETRY, JOBS_PER_SUBMITTER, JOURNAL_EVENTS},
+    wire::{JobState, Terms},
 };
 
 /// Clients that wait to hear that their job is taken.
@@ -56,7 +57,7 @@ impl Core {
         self.disk_trouble.clone().or_else(|| self.no_space.clone())
     }
 
-    pub(super) fn submit(&mut self, description: JobDescription, min_nodes: u32, owner: &str, limited: bool) -> Result<JobId, String> {
+    pub(super) fn submit(&mut self, description: JobDescription, mut terms: Terms, owner: &str, limited: bool) -> Result<JobId, String> {
         let words = |error: &dyn std::fmt::Display| format!("the job could not be stored: {error}");
         if let Some(refusal) = self.refusal() {
             return Err(refusal);
@@ -66,11 +67,12 @@ impl Core {
         if limited && running.by_ref().filter(own).count() >= JOBS_PER_SUBMITTER {
             return Err(format!("{JOBS_PER_SUBMITTER} jobs of {owner} wait or run already"));
         }
+        self.settle_dependencies(&mut terms)?;
         let job = self.shared.store.next_job().map_err(|error| words(&error))?;
         let frame = postcard::to_stdvec(&description.frame).map_err(|error| words(&error))?;
         let frame = self.shared.store.put(&frame).map_err(|error| words(&error))?;
         let submitted = seconds_now();
-        let spec = submission::spec(&description, min_nodes);
+        let spec = submission::spec(&description, &terms, owner);
         let stored = StoredJob { description, frame, submitted };
         self.shared.store.put_job(job, &stored, owner).map_err(|error| words(&error))?;
         tracing::info!(job = job.0, name = stored.description.name, owner, "a job was submitted");
@@ -78,6 +80,29 @@ impl Core {
         self.step(Event::JobSubmitted { job, spec });
         self.publish();
         Ok(job)
+    }
+
+    /// Jobs that are finished and perhaps forgotten need not be waited for; such as came to no good end, or never were, cannot be.
+    fn settle_dependencies(&self, terms: &mut Terms) -> Result<(), String> {
+        let open: BTreeSet<JobId> = self.farm.jobs().iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
+        let ended: Vec<JobId> = terms.after.iter().copied().filter(|job| !open.contains(job)).collect();
+        for job in ended {
+            match self.shared.store.end(job).map(|end| end.state) {
+                Ok(JobState::Finished) => terms.after.retain(|other| *other != job),
+                Ok(state) => return Err(format!("it is to wait for job {}, which is not finished: {}", job.0, status::words(&state))),
+                Err(_) => return Err(format!("it is to wait for job {}, and there is none; `tessera list` shows which there are", job.0)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells the core of something that happens to a job that waits or runs.
+    pub(super) fn change_open(&mut self, job: JobId, event: Event) -> Result<(), String> {
+        if !self.farm.jobs().iter().any(|known| known.id == job && known.outcome.is_none()) {
+            return Err(format!("there is no job {} that runs or waits", job.0));
+        }
+        self.step(event);
+        Ok(())
     }
 
     pub(super) fn answer_when_taken(&mut self, job: JobId, reply: oneshot::Sender<Result<JobId, String>>) {
@@ -114,7 +139,6 @@ impl Core {
     }
 
     pub(super) fn ended(&mut self, job: JobId, outcome: &Outcome) {
-        self.last_end = Instant::now();
         if let Some(record) = self.farm.record(job) {
             self.shared.metrics.ended(outcome, &record);
         }
@@ -133,14 +157,10 @@ impl Core {
         });
     }
 
-    /// Begins a long journal anew while nothing goes on. The farm forgets jobs that are over; the store knows them still.
-    pub(super) fn rest(&mut self) {
-        if self.last_end.elapsed() < JOURNAL_REST || self.shared.metrics.journal_events.get() <= JOURNAL_EVENTS {
-            return;
-        }
-        if let Some(farm) = self.disk.renew(&self.farm) {
-            self.farm = farm;
-            self.changed = true;
+    /// Shortens a long journal: a bound of the time that a start takes.
+    pub(super) fn shorten_journal(&mut self) {
+        if self.shared.metrics.journal_events.get() > JOURNAL_EVENTS {
+            self.disk.renew(&self.farm);
         }
     }
 

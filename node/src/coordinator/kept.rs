@@ -383,6 +383,9 @@ mod tests {
         let snapshot = |id, outcome| JobSnapshot {
             id: JobId(id),
             name: "job".into(),
+            owner: "someone".into(),
+            priority: 0,
+            paused: false,
             phase: crate::farm::JobPhase::Waiting,
             outcome,
             parts: 0,

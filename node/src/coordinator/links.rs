@@ -60,10 +60,6 @@ impl Core {
         }
         let info = NodeInfo { name, lanes: hello.lanes, build: hello.build, address };
         self.step(Event::NodeJoined { node, incarnation, info });
-        if hello.revision != tessera_engine::REVISION {
-            let reason = format!("its engine has revision {}, the coordinator's {}", hello.revision, tessera_engine::REVISION);
-            self.step(Event::NodeProved { node, incarnation, verdict: Err(reason) });
-        }
     }
 
     /// A node that said goodbye, or was sent away, has left. One whose connection broke is only silent: it may come back with what it holds.

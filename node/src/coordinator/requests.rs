@@ -14,7 +14,7 @@ use crate::{
     job::JobDescription,
     limits::{ASSET_LEAST_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
     wire::{
-        self, FileHeader, FrameError, JobState, KeptJob, Request, Response,
+        self, FileHeader, FrameError, JobState, KeptJob, Place, Request, Response, Terms,
         tls::{Deed, Peer, Role},
     },
 };
@@ -52,11 +52,11 @@ async fn answer(
         return send.finish().map_err(|error| io::Error::other(error).into());
     }
     match request {
-        Request::Submit { description, min_nodes } => {
+        Request::Submit { description, terms } => {
             // Assets may take hours: others are not to wait for them, but another submission of this client does.
             drop(room);
             let _turn = turn.acquire().await;
-            submit(shared, client, description, min_nodes, &mut send, &mut receive).await?;
+            submit(shared, client, description, terms, &mut send, &mut receive).await?;
         }
         Request::Status => {
             let status = shared.status.borrow().as_ref().clone();
@@ -80,6 +80,10 @@ async fn answer(
             let done = shared.ask(Input::Release { node, reply }, answer).await;
             say(&mut send, &done.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
         }
+        Request::Move { job, place } => {
+            let moved = move_job(shared, client, job, place).await;
+            say(&mut send, &moved.map_or_else(|reason| Response::Refused { reason }, |()| Response::Done)).await?;
+        }
         Request::Cancel { job } => {
             let (reply, answer) = oneshot::channel();
             let cancel = Input::Cancel { job, reason: format!("cancelled by {client}"), reply };
@@ -88,6 +92,23 @@ async fn answer(
         }
     }
     send.finish().map_err(io::Error::other)?;
+    Ok(())
+}
+
+async fn move_job(shared: &Shared, client: &Peer, job: JobId, place: Place) -> Result<(), String> {
+    if let Place::Ranked(priority) = place {
+        submission::check_priority(priority)?;
+        may_rank(client, priority)?;
+    }
+    let (reply, answer) = oneshot::channel();
+    shared.ask(Input::Move { job, place, reason: format!("by {client}"), reply }, answer).await
+}
+
+/// Operators alone put jobs before those of others.
+fn may_rank(client: &Peer, priority: i32) -> Result<(), String> {
+    if priority > 0 && client.role != Role::Operator {
+        return Err(format!("{client} may not give a job the priority {priority}: above 0 that takes an operator's key"));
+    }
     Ok(())
 }
 
@@ -100,6 +121,7 @@ fn permit(shared: &Shared, client: &Peer, request: &Request) -> Result<(), Strin
         Request::Cancel { job } => (Deed::Cancel, Some(*job)),
         Request::Delete { job } => (Deed::Delete, Some(*job)),
         Request::Release { .. } => (Deed::Release, None),
+        Request::Move { job, .. } => (Deed::Move, Some(*job)),
     };
     let owner = job.and_then(|job| shared.store.owner(job));
     if client.role.may(deed, owner.as_ref() == Some(&client.name)) {
@@ -121,13 +143,13 @@ async fn submit(
     shared: &Shared,
     client: &Peer,
     description: Box<JobDescription>,
-    min_nodes: u32,
+    terms: Terms,
     send: &mut SendStream,
     receive: &mut RecvStream,
 ) -> Result<(), FrameError> {
     let submitting = shared.store.submitting.clone();
     let _taking = submitting.read().await;
-    if let Err(reason) = may_submit(shared, &description).await {
+    if let Err(reason) = may_submit(shared, client, &description, &terms).await {
         return say(send, &Response::Refused { reason }).await;
     }
     let wanted: Vec<_> = description.assets.iter().copied().filter(|id| !shared.store.asset(*id).exists()).collect();
@@ -155,7 +177,7 @@ async fn submit(
         return say(send, &Response::Denied { reason: shared.quota.refusal(&client.name) }).await;
     }
     let (reply, answer) = oneshot::channel();
-    let submitted = shared.ask(Input::Submit { description, min_nodes, owner: client.name.clone(), limited, reply }, answer).await;
+    let submitted = shared.ask(Input::Submit { description, terms, owner: client.name.clone(), limited, reply }, answer).await;
     if let (Ok(job), true) = (&submitted, limited) {
         shared.quota.add(&client.name, &format!("jobs/{}", job.0), weight)?;
     }
@@ -168,8 +190,9 @@ async fn bytes_left(shared: &Shared, owner: &str) -> io::Result<u64> {
 }
 
 /// Whether a job is taken: it is as it should be, and there is room for it.
-async fn may_submit(shared: &Shared, description: &JobDescription) -> Result<(), String> {
-    submission::check(description)?;
+async fn may_submit(shared: &Shared, client: &Peer, description: &JobDescription, terms: &Terms) -> Result<(), String> {
+    submission::check(description, terms)?;
+    may_rank(client, terms.priority)?;
     shared.status.borrow().refusal.clone().map_or(Ok(()), Err)?;
     let (store, film) = (shared.store.clone(), &description.frame.film);
     let pixels = u64::from(film.width) * u64::from(film.height);

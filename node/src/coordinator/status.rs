@@ -44,6 +44,9 @@ fn job(job: JobSnapshot, trouble: Option<String>, times: &mut BTreeMap<JobId, Ti
     JobStatus {
         job: job.id,
         name: job.name,
+        owner: job.owner,
+        priority: job.priority,
+        paused: job.paused,
         state: state(job.phase, job.outcome),
         parts: count(job.parts),
         committed: count(job.committed),
@@ -57,6 +60,17 @@ fn job(job: JobSnapshot, trouble: Option<String>, times: &mut BTreeMap<JobId, Ti
 /// Where a job stands.
 pub fn state_of(job: &JobSnapshot) -> JobState {
     state(job.phase, job.outcome.clone())
+}
+
+/// How a job ended, or that it has not, in words.
+pub fn words(state: &JobState) -> String {
+    match state {
+        JobState::Finished => "it is finished".to_owned(),
+        JobState::Failed(reason) => format!("it failed: {reason}"),
+        JobState::Cancelled(reason) => format!("it was cancelled: {reason}"),
+        JobState::Incomplete(holes) => format!("{holes} parts of it could not be rendered"),
+        _ => "it is not over".to_owned(),
+    }
 }
 
 fn state(phase: JobPhase, outcome: Option<Outcome>) -> JobState {

@@ -6,7 +6,7 @@
 use std::collections::BTreeSet;
 
 use super::job::Job;
-use super::node::{NodeState, Nodes};
+use super::node::{Node, NodeState, Nodes};
 use super::part::{Place, Role};
 use super::turn::Turn;
 use super::{Command, Farm, JobId, LeaseId};
@@ -22,7 +22,8 @@ impl Farm {
             (known.state, known.heard) = (NodeState::Quarantined, self.turn.now);
             known.reason.clone_from(&reason);
             let incarnation = known.incarnation;
-            self.with_job(job, |job, turn, nodes| job.distrust(turn, nodes, node, &reason));
+            self.with_open(|job, turn, nodes| job.distrust(turn, nodes, node, &reason));
+            self.nodes.entry(node).and_modify(Node::empty);
             self.turn.put(Command::Close { node, incarnation, reason: quarantined(&reason) });
         }
     }
@@ -51,13 +52,13 @@ impl Job {
     }
 
     /// Lets idle nodes render delivered parts again.
-    pub(super) fn audit(&mut self, turn: &mut Turn, nodes: &Nodes, ids: &[NodeId]) {
+    pub(super) fn audit(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
         if self.audits.is_empty() || !self.loose.is_empty() {
             return;
         }
         let strays = self.strays();
-        for id in self.idle(nodes, ids) {
-            while self.members.get(&id).is_some_and(|member| member.is_idle()) {
+        for id in self.idle(turn, nodes, ids) {
+            while self.is_idle(turn, nodes, id) {
                 let free = |part: &PartId| self.may_audit(*part, id) && !strays.contains(&(*part, id));
                 let Some(part) = self.audits.iter().copied().find(free) else { break };
                 self.audits.remove(&part);
@@ -129,7 +130,7 @@ impl Job {
     }
 
     /// Nothing that a node delivered counts any more.
-    fn distrust(&mut self, turn: &mut Turn, nodes: &Nodes, node: NodeId, reason: &str) {
+    fn distrust(&mut self, turn: &mut Turn, nodes: &mut Nodes, node: NodeId, reason: &str) {
         self.log.event(turn.now, EventKind::Quarantined, Some(node), Vec::new(), reason);
         let name = nodes.get(&node).map_or("?", |node| node.info.name.as_str());
         self.log.warn(format!("node {name} was quarantined: {reason}; what it had rendered was rendered again"));
@@ -144,7 +145,7 @@ impl Job {
     }
 
     /// The pixels of a delivered part do not count any more: it is rendered again.
-    fn revoke(&mut self, turn: &mut Turn, id: PartId, outcome: AttemptOutcome, reason: &str) {
+    pub(super) fn revoke(&mut self, turn: &mut Turn, id: PartId, outcome: AttemptOutcome, reason: &str) {
         if let Some(lease) = self.take_back(id, outcome, reason) {
             turn.put(Command::Revoke { job: self.id, part: id, lease });
         }

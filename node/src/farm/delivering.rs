@@ -22,11 +22,12 @@ impl Farm {
     /// A node delivers a part. The shell must be told what becomes of its pixels.
     pub(super) fn rendered(&mut self, job: JobId, delivery: Delivery) {
         let alive = self.node_heard(delivery.node, delivery.incarnation);
+        self.lane_is_free(delivery.node, job, delivery.lease);
         let known = self.jobs.get_mut(&job).filter(|job| job.outcome().is_none());
         let verdict = match known {
             _ if !alive => Err(DiscardReason::Dead),
             None => Err(DiscardReason::Unknown),
-            Some(job) => job.deliver(&mut self.turn, &self.nodes, delivery),
+            Some(job) => job.deliver(&mut self.turn, &mut self.nodes, delivery),
         };
         if let Err(reason) = verdict {
             self.turn.put(Command::Discard { job, lease: delivery.lease, reason });
@@ -37,14 +38,13 @@ impl Farm {
 
 impl Job {
     /// Takes the pixels of an attempt, if they are the first of their part.
-    fn deliver(&mut self, turn: &mut Turn, nodes: &Nodes, delivery: Delivery) -> Result<(), DiscardReason> {
+    fn deliver(&mut self, turn: &mut Turn, nodes: &mut Nodes, delivery: Delivery) -> Result<(), DiscardReason> {
         let Delivery { node, incarnation, lease, hash, seconds } = delivery;
-        self.lane_is_free(turn, node, lease);
         let Some(of) = self.leases.get(&lease).filter(|of| (of.node, of.incarnation) == (node, incarnation)) else {
             return Err(self.why_unknown(lease));
         };
         let (part, now, is_audit) = (of.part, turn.now, self.part(of.part).is_delivered());
-        self.release_lease(turn, lease);
+        self.release_lease(turn, nodes, lease);
         let state = self.part_mut(part);
         state.votes.push((node, hash));
         if let Some(attempt) = state.attempt_mut(lease) {
@@ -90,11 +90,11 @@ impl Job {
     }
 
     /// Calls back all open attempts at a part.
-    pub(super) fn cancel_attempts(&mut self, turn: &mut Turn, nodes: &Nodes, part: PartId, reason: &str) {
+    pub(super) fn cancel_attempts(&mut self, turn: &mut Turn, nodes: &mut Nodes, part: PartId, reason: &str) {
         let open: Vec<LeaseId> = self.leases.iter().filter(|(_, lease)| lease.part == part).map(|(lease, _)| *lease).collect();
         for lease in open {
             self.call_back(turn, nodes, lease);
-            self.close(turn, lease, AttemptOutcome::Cancelled, reason);
+            self.close(turn, nodes, lease, AttemptOutcome::Cancelled, reason);
         }
     }
 
@@ -108,8 +108,8 @@ impl Job {
     }
 
     /// An attempt is over without a result.
-    pub(super) fn close(&mut self, turn: &mut Turn, lease: LeaseId, outcome: AttemptOutcome, reason: &str) {
-        if let Some(of) = self.release_lease(turn, lease) {
+    pub(super) fn close(&mut self, turn: &mut Turn, nodes: &mut Nodes, lease: LeaseId, outcome: AttemptOutcome, reason: &str) {
+        if let Some(of) = self.release_lease(turn, nodes, lease) {
             self.part_mut(of.part).end_attempt(lease, turn.now, outcome, reason);
             if of.role == Role::Audit {
                 self.audits.insert(of.part);
@@ -118,22 +118,28 @@ impl Job {
     }
 
     /// Takes an attempt off the books; the next one of its node can have begun now.
-    pub(super) fn release_lease(&mut self, turn: &Turn, lease: LeaseId) -> Option<Lease> {
+    pub(super) fn release_lease(&mut self, turn: &mut Turn, nodes: &mut Nodes, lease: LeaseId) -> Option<Lease> {
         let of = self.leases.remove(&lease)?;
-        if let Some(member) = self.members.get_mut(&of.node) {
-            member.held.retain(|held| *held != lease);
-        }
-        self.note_begun(turn, of.node);
+        self.let_go(turn, nodes, of.node, lease);
+        self.note_begun(turn, nodes, of.node);
         Some(of)
     }
 
+    /// A node does not hold an attempt any more, as far as its lanes are concerned; what it holds of other jobs may have begun now.
+    fn let_go(&self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, lease: LeaseId) {
+        if let Some(node) = nodes.get_mut(&id) {
+            node.held.retain(|held| held.lease != lease);
+            if node.held.iter().any(|held| held.job != self.id) {
+                turn.freed.insert(id);
+            }
+        }
+    }
+
     /// An attempt does not count any more, but may still end well. Its part goes to another, unless one is at it already.
-    pub(super) fn set_aside(&mut self, lease: LeaseId) {
+    pub(super) fn set_aside(&mut self, turn: &mut Turn, nodes: &mut Nodes, lease: LeaseId) {
         let Some(of) = self.leases.get_mut(&lease) else { return };
         let (part, role, node) = (of.part, std::mem::replace(&mut of.role, Role::Stray), of.node);
-        if let Some(member) = self.members.get_mut(&node) {
-            member.held.retain(|held| *held != lease);
-        }
+        self.let_go(turn, nodes, node, lease);
         match role {
             Role::Main => self.loosen(part),
             Role::Audit => _ = self.audits.insert(part),

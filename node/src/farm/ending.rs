@@ -1,48 +1,20 @@
-//! Jobs are submitted, wait for their turn, and end.
+//! Jobs end, or are left by all nodes.
+
+use std::time::Duration;
 
 use super::job::{Job, Phase, Stage};
-use super::node::Nodes;
+use super::node::{Node, Nodes};
 use super::part::{PartState, Place};
 use super::turn::Turn;
-use super::{Command, Farm, JobId, JobSpec, Outcome, ToNode};
-use crate::limits::{JOBS_KEPT, JOBS_WAITING};
+use super::{Build, Command, FarmConfig, Outcome, ToNode};
 use crate::manifest::AttemptOutcome;
-use crate::schedule::{NodeId, PartId};
-
-impl Farm {
-    pub(super) fn job_submitted(&mut self, id: JobId, spec: JobSpec) {
-        if self.jobs.contains_key(&id) {
-            return;
-        }
-        let waiting = self.jobs.values().filter(|job| job.outcome().is_none()).count();
-        self.jobs.insert(id, Job::new(id, spec, self.turn.now));
-        if waiting >= JOBS_WAITING {
-            let reason = format!("{JOBS_WAITING} jobs wait already");
-            self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason }));
-        }
-        let over: Vec<JobId> = self.jobs.values().filter(|job| job.outcome().is_some()).map(|job| job.id).collect();
-        over.iter().take(over.len().saturating_sub(JOBS_KEPT)).for_each(|id| _ = self.jobs.remove(id));
-    }
-
-    pub(super) fn job_cancelled(&mut self, id: JobId, reason: String) {
-        self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Cancelled { reason }));
-    }
-
-    /// Begins the next job, if there is one.
-    pub(super) fn start_next(&mut self) -> bool {
-        let ended = self.running;
-        self.jobs.values_mut().filter(|job| job.outcome().is_some() && Some(job.id) != ended).for_each(Job::forget_details);
-        self.running = self.jobs.values().find(|job| job.outcome().is_none()).map(|job| job.id);
-        self.with_running(|job, turn, nodes| job.begin(turn, nodes));
-        self.running.is_some()
-    }
-}
+use crate::schedule::NodeId;
 
 impl Job {
     /// The job is over: everything that it holds is released.
-    pub(super) fn end(&mut self, turn: &mut Turn, nodes: &Nodes, outcome: Outcome) {
+    pub(super) fn end(&mut self, turn: &mut Turn, nodes: &mut Nodes, outcome: Outcome) {
         let open: Vec<_> = self.leases.keys().copied().collect();
-        open.into_iter().for_each(|lease| self.close(turn, lease, AttemptOutcome::Cancelled, "the job is over"));
+        open.into_iter().for_each(|lease| self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "the job is over"));
         for (id, member) in &mut self.members {
             member.queue.clear();
             if let Some(node) = nodes.get(id).filter(|node| node.lives(member.incarnation) && member.stage != Stage::Away) {
@@ -54,13 +26,15 @@ impl Job {
         (self.reconsider, self.next_due) = (None, None);
         self.question = None;
         self.deserted = None;
+        self.paused = false;
         self.log.ended = Some(turn.now);
         self.phase = Phase::Over(outcome.clone());
+        turn.ended = true;
         turn.put(Command::End { job: self.id, outcome });
     }
 
     /// The output files stand, or cannot be written.
-    pub fn assembled(&mut self, turn: &mut Turn, nodes: &Nodes, result: Result<(), String>) {
+    pub fn assembled(&mut self, turn: &mut Turn, nodes: &mut Nodes, result: Result<(), String>) {
         if self.phase == Phase::Assembling {
             let holes = self.holes().count();
             let whole = if holes == 0 { Outcome::Finished } else { Outcome::Incomplete { holes } };
@@ -74,19 +48,38 @@ impl Job {
     }
 
     /// Fails a job that no node has been there for, for long.
-    pub(super) fn watch_desertion(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn watch_desertion(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let able = |id: &NodeId| self.members.get(id).is_none_or(|member| !matches!(member.stage, Stage::Failed(_)));
         let delivered = !self.parts.is_empty() && self.parts.len() == self.committed + self.dropped + self.committing.len();
         let wants = !matches!(self.phase, Phase::Waiting | Phase::Assembling | Phase::Over(_)) && !delivered;
-        if !wants || nodes.iter().any(|(id, node)| node.is_hopeful() && able(id)) {
+        let of_build = |node: &Node| node.proof.is_none() || self.is_of_build(node);
+        // A lane that seems to hang may only be slow: that is reason enough to go elsewhere, but not to give up.
+        let outdated = self.is_outdated(turn, nodes);
+        let works = |node: &Node| node.is_hopeful() && (node.lanes() > 0 || !outdated);
+        if !wants || self.paused || nodes.iter().any(|(id, node)| works(node) && of_build(node) && able(id)) {
             self.deserted = None;
             return;
         }
         let since = *self.deserted.get_or_insert(turn.now);
-        if turn.strikes(since + turn.config.no_node_timeout) {
-            let reason = self.desertion(turn.config.no_node_timeout.as_secs_f64());
-            self.end(turn, nodes, Outcome::Failed { reason });
+        let patience = self.patience(&turn.config);
+        if turn.strikes(since + patience) {
+            if outdated {
+                self.begin_anew(turn, nodes);
+            } else {
+                self.end(turn, nodes, Outcome::Failed { reason: self.desertion(patience.as_secs_f64()) });
+            }
         }
+    }
+
+    /// Whether nodes of the coordinator's build are there, and it began on another.
+    fn is_outdated(&self, turn: &Turn, nodes: &Nodes) -> bool {
+        let current = |build: &Build| nodes.values().any(|node| node.is_ready() && node.proof == Some(build.canary));
+        self.build != turn.build && turn.build.as_ref().is_some_and(current)
+    }
+
+    /// How long it waits for a node when there is none.
+    pub(super) fn patience(&self, config: &FarmConfig) -> Duration {
+        self.spec.patience.unwrap_or(config.no_node_timeout)
     }
 
     fn desertion(&self, seconds: f64) -> String {
@@ -98,36 +91,5 @@ impl Job {
         let parts =
             if self.parts.is_empty() { String::new() } else { format!("; {} of {} parts were done", self.committed, self.parts.len()) };
         format!("{what}, and none came within {seconds} s{parts}")
-    }
-
-    /// The coordinator was started anew: pixels that were not on disk are gone, and what was asked has to be asked again.
-    pub fn restarted(&mut self, turn: &mut Turn) {
-        self.question = None;
-        self.deserted = None;
-        let gone: Vec<PartId> = self.committing.values().copied().collect();
-        for part in gone {
-            self.take_back(part, AttemptOutcome::Lost, "the coordinator was started anew");
-        }
-        if self.phase == Phase::Assembling {
-            turn.put(Command::Assemble { job: self.id });
-        }
-    }
-
-    /// A node's connection was renewed: what it may not have heard is said again. Nodes take a repeated order as one.
-    pub fn repeat_orders(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
-        let (Some(member), Some(node)) = (self.members.get(&id), nodes.get(&id)) else { return };
-        match member.stage {
-            Stage::Preparing(_) => turn.send(id, node, ToNode::Prepare { job: self.id }),
-            Stage::Prepared => self.probe_latecomer(turn, nodes, id),
-            _ => {}
-        }
-        let Some(member) = self.members.get(&id) else { return };
-        for lease in member.held.iter().chain(&member.hanging) {
-            let message = match self.leases.get(lease) {
-                Some(of) => ToNode::Render { job: self.id, lease: *lease, rect: self.part(of.part).rect, samples: self.all_samples() },
-                None => ToNode::Cancel { job: self.id, lease: *lease },
-            };
-            turn.send(id, node, message);
-        }
     }
 }

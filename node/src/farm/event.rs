@@ -1,5 +1,7 @@
 //! What happens to the farm.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
@@ -27,6 +29,25 @@ pub struct JobSpec {
     pub min_nodes: u32,
     /// Share of the parts that two nodes render, to compare their pixels: 0 to 1.
     pub audit: f64,
+    /// Who submitted it: submitters of equal priority share the farm.
+    pub owner: String,
+    /// Its rank among jobs: higher ones go first.
+    pub priority: i32,
+    /// Jobs that have to be finished before it begins.
+    pub after: Vec<JobId>,
+    /// Failures of a part, on different nodes where there are such, after which it is cut up or left out: 1 or more.
+    pub attempts: u32,
+    /// How long it waits for a node when there is none; `None` for the farm's own patience.
+    pub patience: Option<Duration>,
+}
+
+/// What a program computes with: nodes of one build give the same pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Build {
+    /// [`tessera_engine::REVISION`] of its engine.
+    pub revision: u32,
+    /// What it renders the canary part to.
+    pub canary: [u8; 32],
 }
 
 /// What a node says of itself when it joins.
@@ -68,6 +89,27 @@ pub enum Event {
         /// Who, or why.
         reason: String,
     },
+    /// Someone wants the job to wait.
+    JobPaused {
+        /// The job.
+        job: JobId,
+        /// Who, or why.
+        reason: String,
+    },
+    /// It need not wait any more.
+    JobResumed {
+        /// The job.
+        job: JobId,
+        /// Who, or why.
+        reason: String,
+    },
+    /// Someone gives the job another rank.
+    JobRanked {
+        /// The job.
+        job: JobId,
+        /// Its new priority.
+        priority: i32,
+    },
     /// A node connected and proved its certificate.
     NodeJoined {
         /// Its id (the same name has the same id).
@@ -77,14 +119,21 @@ pub enum Event {
         /// What it says of itself.
         info: NodeInfo,
     },
-    /// A node rendered the canary part; the shell compared hashes.
+    /// A node rendered the canary part.
     NodeProved {
         /// The node.
         node: NodeId,
         /// Its life.
         incarnation: Incarnation,
-        /// Nothing, or why it gets no work.
-        verdict: Result<(), String>,
+        /// What it came to.
+        canary: [u8; 32],
+    },
+    /// A node is about to go: it finishes what its lanes render.
+    NodeDraining {
+        /// The node.
+        node: NodeId,
+        /// Its life.
+        incarnation: Incarnation,
     },
     /// Any authenticated sign of life.
     NodeHeard {
@@ -199,7 +248,10 @@ pub enum Event {
         result: Result<(), String>,
     },
     /// The coordinator was started anew and has replayed its journal; parts whose pixels were found on disk are committed by now.
-    Restarted,
+    Restarted {
+        /// What it computes with.
+        build: Build,
+    },
     /// Nothing but time has passed: send it when [`super::Farm::next_deadline`] is reached.
     Tick,
 }

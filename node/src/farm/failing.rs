@@ -9,17 +9,16 @@ use super::part::{Place, Role};
 use super::tail::cut_up;
 use super::turn::Turn;
 use super::{LeaseId, Outcome};
-use crate::limits::{FAILURES_PER_PART, HOLE_EDGE, NARROWED_PER_JOB};
+use crate::limits::{HOLE_EDGE, NARROWED_PER_JOB};
 use crate::manifest::{AttemptOutcome, EventKind};
 use crate::schedule::{NodeId, PartId};
 
 impl Job {
     /// A node could not render a part: others try.
-    pub fn render_failed(&mut self, turn: &mut Turn, nodes: &Nodes, node: NodeId, lease: LeaseId, reason: &str) {
-        self.lane_is_free(turn, node, lease);
+    pub fn render_failed(&mut self, turn: &mut Turn, nodes: &mut Nodes, node: NodeId, lease: LeaseId, reason: &str) {
         let Some(of) = self.leases.get(&lease).filter(|of| of.node == node) else { return };
         let (part, role) = (of.part, of.role);
-        self.close(turn, lease, AttemptOutcome::Failed, reason);
+        self.close(turn, nodes, lease, AttemptOutcome::Failed, reason);
         self.part_mut(part).failures.push((node, reason.to_owned()));
         if role == Role::Main {
             self.loosen(part);
@@ -29,10 +28,10 @@ impl Job {
     }
 
     /// Cuts a part up, or gives it up, if it has failed too often.
-    pub(super) fn consider_failures(&mut self, turn: &mut Turn, nodes: &Nodes, id: PartId) {
+    pub(super) fn consider_failures(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: PartId) {
         let part = self.part(id);
         let small = part.rect.width <= HOLE_EDGE && part.rect.height <= HOLE_EDGE;
-        let enough = if part.suspect && !small { 1 } else { FAILURES_PER_PART };
+        let enough = if part.suspect && !small { 1 } else { self.spec.attempts.max(1) as usize };
         if part.is_delivered() || part.is_settled() || part.failures.len() < enough {
             return;
         }
@@ -66,7 +65,7 @@ impl Job {
         let first = self
             .parts
             .iter()
-            .find(|part| part.failures.len() >= FAILURES_PER_PART)
+            .find(|part| part.failures.len() >= self.spec.attempts as usize)
             .or_else(|| self.parts.iter().find(|part| !part.failures.is_empty()));
         first.map_or_else(|| "nobody says why".to_owned(), |part| self.told_failures(part.id))
     }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::job::{Job, Member, Phase, Stage};
 use super::node::Nodes;
 use super::turn::Turn;
@@ -10,7 +12,7 @@ use crate::manifest::EventKind;
 use crate::schedule::NodeId;
 
 /// What a job waits for before its probe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Gathering {
     /// When it stops waiting for the nodes it asked for; `None` once it has.
     until: Option<Duration>,
@@ -26,15 +28,16 @@ impl Gathering {
 
 impl Job {
     /// The job's turn has come.
-    pub fn begin(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub fn begin(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
+        self.build = turn.build;
         self.phase = Phase::Gathering(Gathering { until: Some(turn.now + turn.config.gather_timeout), grace: None });
         let ready: Vec<NodeId> = nodes.iter().filter(|(_, node)| node.is_ready()).map(|(id, _)| *id).collect();
         ready.into_iter().for_each(|node| self.enlist(turn, nodes, node));
     }
 
     /// A node is ready: it gets the scene, unless this life of it has it.
-    pub fn enlist(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
-        let Some(node) = nodes.get(&id).filter(|node| node.is_ready()) else { return };
+    pub fn enlist(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
+        let Some(node) = nodes.get(&id).filter(|node| node.is_ready() && self.is_of_build(node)) else { return };
         if self.members.get(&id).is_some_and(|member| member.incarnation == node.incarnation && member.stage != Stage::Away) {
             return;
         }
@@ -46,15 +49,13 @@ impl Job {
             probed: Vec::new(),
             pace: 1.0,
             queue: Default::default(),
-            held: Vec::new(),
-            hanging: Default::default(),
         };
         self.members.insert(id, member);
         turn.send(id, node, ToNode::Prepare { job: self.id });
     }
 
     /// A node has compiled the scene, or cannot.
-    pub fn prepared(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, result: Result<(), String>) {
+    pub fn prepared(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, result: Result<(), String>) {
         let Some(member) = self.members.get_mut(&id).filter(|member| matches!(member.stage, Stage::Preparing(_))) else { return };
         match result {
             Ok(()) => {
@@ -82,12 +83,12 @@ impl Job {
         member.stage = Stage::Failed(reason);
     }
 
-    pub(super) fn advance_gathering(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn advance_gathering(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let Phase::Gathering(gathering) = &mut self.phase else { return };
         let stages: Vec<&Stage> = self
             .members
             .iter()
-            .filter(|(id, _)| nodes.get(id).is_some_and(|node| node.is_ready()))
+            .filter(|(id, member)| nodes.get(id).is_some_and(|node| node.is_ready() && node.incarnation == member.incarnation))
             .map(|(_, member)| &member.stage)
             .collect();
         let count = |wanted: fn(&Stage) -> bool| stages.iter().filter(|stage| wanted(stage)).count();
@@ -112,7 +113,7 @@ impl Job {
     }
 
     /// As many nodes as the job asked for cannot render it, and no other is in sight.
-    fn fail_if_nobody_can(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    fn fail_if_nobody_can(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let in_sight = nodes.values().any(|node| matches!(node.state, NodeState::Proving | NodeState::Suspected));
         if !in_sight {
             let reason = format!("no node can render it: {}", self.failures());

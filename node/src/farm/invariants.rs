@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use super::Farm;
 use super::job::{Job, Phase};
+use super::node::{Held, Nodes};
 use super::part::{Place, Role};
-use super::{Farm, LeaseId};
 use crate::schedule::{NodeId, PartId};
 
 impl Farm {
@@ -15,19 +16,34 @@ impl Farm {
     pub fn check_invariants(&self) -> Result<(), String> {
         let open = self.jobs.values().filter(|job| !matches!(job.phase, Phase::Waiting | Phase::Over(_)));
         for job in open {
-            if Some(job.id) != self.running {
-                return Err(format!("job {} has begun but does not run", job.id.0));
+            if !self.queue.open.contains(&job.id) {
+                return Err(format!("job {} has begun and is not among those that have", job.id.0));
             }
             let void = job.leases.values().find(|lease| !self.nodes.get(&lease.node).is_some_and(|node| node.lives(lease.incarnation)));
             if let Some(lease) = void {
                 return Err(format!("part {} is leased to a life of node {} that is over", lease.part.0, lease.node.0));
             }
-            job.check_places().and_then(|()| job.check_leases()).map_err(|wrong| format!("job {}: {wrong}", job.id.0))?;
+            job.check_places().and_then(|()| job.check_leases(&self.nodes)).map_err(|wrong| format!("job {}: {wrong}", job.id.0))?;
         }
+        self.check_nodes()?;
         match self.next_deadline() {
             Some(at) if self.turn.ticks && at <= self.turn.now => Err("a deadline has struck and is still there".into()),
             _ => Ok(()),
         }
+    }
+
+    /// Nodes hold what open jobs have handed out to them, and nothing else.
+    fn check_nodes(&self) -> Result<(), String> {
+        for (id, node) in &self.nodes {
+            let known = |held: &Held| {
+                let lease = self.jobs.get(&held.job).and_then(|job| job.leases.get(&held.lease));
+                lease.is_some_and(|lease| lease.node == *id && lease.role != Role::Stray)
+            };
+            if let Some(held) = node.held.iter().find(|held| !known(held)) {
+                return Err(format!("node {} holds lease {} of job {}, which is not its own", id.0, held.lease.0, held.job.0));
+            }
+        }
+        Ok(())
     }
 }
 
@@ -38,8 +54,8 @@ impl Farm {
         let job = self.jobs.iter().find(|(id, job)| other.jobs.get(id) != Some(job));
         let node = node.map(|(id, node)| format!("{node:?} against {:?}", other.nodes.get(id)));
         let job = job.map(|(id, job)| format!("{job:?} against {:?}", other.jobs.get(id)));
-        let names = (self.turn.last_name, self.running, self.nodes.len(), self.jobs.len());
-        let others = (other.turn.last_name, other.running, other.nodes.len(), other.jobs.len());
+        let names = (self.turn.last_name, self.turn.build, &self.earlier_builds, &self.queue, self.nodes.len(), self.jobs.len());
+        let others = (other.turn.last_name, other.turn.build, &other.earlier_builds, &other.queue, other.nodes.len(), other.jobs.len());
         node.or(job).or_else(|| (names != others).then(|| format!("{names:?} against {others:?}")))
     }
 }
@@ -78,7 +94,7 @@ impl Job {
     }
 
     /// Every lease does what its role says, and nodes hold exactly those that are not stray.
-    fn check_leases(&self) -> Result<(), String> {
+    fn check_leases(&self, nodes: &Nodes) -> Result<(), String> {
         for (id, lease) in &self.leases {
             let part = self.part(lease.part);
             let agrees = match lease.role {
@@ -89,12 +105,8 @@ impl Job {
             };
             expect(agrees, &format!("lease {} is {:?}, but its part is {:?}", id.0, lease.role, part.place))?;
         }
-        let held: usize = self.members.values().map(|member| member.held.len()).sum();
-        expect(held == self.leases.values().filter(|lease| lease.role != Role::Stray).count(), "an attempt that counts is held by nobody")?;
-        let own = |id: &NodeId, lease: &LeaseId| self.leases.get(lease).is_some_and(|of| of.node == *id && of.role != Role::Stray);
-        self.members.iter().try_for_each(|(id, member)| {
-            expect(member.held.iter().all(|lease| own(id, lease)), &format!("node {} holds a lease that is not its own", id.0))
-        })
+        let held: usize = nodes.values().map(|node| node.held_of(self.id).count()).sum();
+        expect(held == self.leases.values().filter(|lease| lease.role != Role::Stray).count(), "an attempt that counts is held by nobody")
     }
 }
 

@@ -3,20 +3,21 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use tessera_engine::part::SampleRange;
 
 use super::gathering::Gathering;
 use super::log::Log;
-use super::node::Nodes;
+use super::node::{Node, Nodes};
 use super::part::{Lease, PartState};
 use super::planning::Pending;
 use super::probing::{Pricing, Probing};
 use super::turn::Turn;
-use super::{FarmConfig, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
+use super::{Build, FarmConfig, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
 use crate::schedule::{CostMap, NodeId, NodePower, PartId};
 
 /// How far a job is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Phase {
     Waiting,
     Gathering(Gathering),
@@ -29,7 +30,7 @@ pub(super) enum Phase {
 }
 
 /// How far a node is with a job.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Stage {
     /// It compiles the scene, since then.
     Preparing(Duration),
@@ -44,7 +45,7 @@ pub(super) enum Stage {
 }
 
 /// A node in a job.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Member {
     pub incarnation: Incarnation,
     pub info: NodeInfo,
@@ -56,10 +57,6 @@ pub(super) struct Member {
     pub pace: f64,
     /// Parts that wait for it, hardest first (on the film's order under the naive policy).
     pub queue: VecDeque<PartId>,
-    /// Attempts that it holds and that are not stray, in the order in which they were handed out.
-    pub held: Vec<LeaseId>,
-    /// Attempts that took so long that their lanes are taken to hang.
-    pub hanging: BTreeSet<LeaseId>,
 }
 
 impl Member {
@@ -67,27 +64,17 @@ impl Member {
     pub fn power(&self) -> Option<f64> {
         self.speed.map(|speed| speed * f64::from(self.info.lanes.max(1)))
     }
-
-    /// Lanes that work.
-    pub fn lanes(&self) -> usize {
-        (self.info.lanes.max(1) as usize).saturating_sub(self.hanging.len())
-    }
-
-    pub fn capacity(&self, config: &FarmConfig) -> usize {
-        self.lanes() * (1 + config.prefetch_per_lane)
-    }
-
-    /// Whether a lane of it has nothing to do.
-    pub fn is_idle(&self) -> bool {
-        self.queue.is_empty() && self.held.len() < self.lanes()
-    }
 }
 
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Job {
     pub id: JobId,
     pub spec: JobSpec,
     pub phase: Phase,
+    /// What nodes that render it have rendered the canary part to, once it has begun: its pixels are those of one build.
+    pub build: Option<Build>,
+    /// Whether nothing of it is handed out, for someone wants it to wait.
+    pub paused: bool,
     pub members: BTreeMap<NodeId, Member>,
     pub pricing: Pricing,
     pub costs: CostMap,
@@ -127,6 +114,8 @@ impl Job {
             id,
             spec,
             phase: Phase::Waiting,
+            build: None,
+            paused: false,
             members: BTreeMap::new(),
             pricing: Pricing::Unknown,
             costs: CostMap::default(),
@@ -162,7 +151,7 @@ impl Job {
     }
 
     /// Does all that has become possible.
-    pub fn advance(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub fn advance(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         self.watch_desertion(turn, nodes);
         self.watch_preparation(turn);
         self.watch_question(turn, nodes);
@@ -189,8 +178,8 @@ impl Job {
 
     /// Nodes that get work now: there, with the scene, measured, and with a lane that works.
     pub fn usable(&self, nodes: &Nodes, id: NodeId) -> bool {
-        let able = |member: &Member| member.stage == Stage::Measured && member.lanes() > 0;
-        self.members.get(&id).is_some_and(able) && nodes.get(&id).is_some_and(|node| node.is_ready())
+        let able = |member: &Member| member.stage == Stage::Measured;
+        self.members.get(&id).is_some_and(able) && nodes.get(&id).is_some_and(|node| node.is_ready() && node.lanes() > 0)
     }
 
     /// Usable nodes with their power, most powerful first.
@@ -208,6 +197,21 @@ impl Job {
             member.power().map(|power| NodePower { id: *id, name, lanes, power })
         };
         self.members.iter().filter_map(power).collect()
+    }
+
+    /// Whether a node has rendered the canary part as those that this job began on.
+    pub fn is_of_build(&self, node: &Node) -> bool {
+        node.proof.is_some() && node.proof == self.build.map(|build| build.canary)
+    }
+
+    /// Attempts of the job that a node holds, in the order in which they were handed out.
+    pub fn held_by<'a>(&'a self, nodes: &'a Nodes, id: NodeId) -> impl DoubleEndedIterator<Item = &'a Lease> {
+        nodes.get(&id).into_iter().flat_map(|node| node.held_of(self.id)).filter_map(|lease| self.leases.get(&lease))
+    }
+
+    /// Parts that no node holds.
+    pub fn waiting_parts(&self) -> usize {
+        self.loose.len() + self.members.values().map(|member| member.queue.len()).sum::<usize>()
     }
 
     /// The samples of a whole part.

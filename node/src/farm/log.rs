@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use crate::limits::EVENTS_PER_JOB;
 use crate::manifest::{EventEntry, EventKind};
 use crate::schedule::{NodeId, PartId};
 
 /// A job's own time line.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Log {
     pub submitted: Duration,
     pub ended: Option<Duration>,

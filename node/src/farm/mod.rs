@@ -1,9 +1,10 @@
 //! The farm's core: a state machine without clocks, sockets, disks, threads or Lua. `step(now, event)` puts out commands.
 //!
-//! A job goes through phases, a file each: it waits its turn (`running`), nodes gather and compile its scene (`gathering`), costs are measured
+//! A job goes through phases, a file each: it waits its turn (`queue`), nodes gather and compile its scene (`gathering`), costs are measured
 //! (`probing`), it is split and assigned (`planning`), its parts are handed out and come back (`rendering`, `delivering`), and it ends (`ending`).
 //! Meanwhile parts move to who is free (`stealing`, `tail`) or still there (`redistribution`, `progress`), are cut up where nobody can render
-//! them (`failing`), and are compared (`auditing`). Nodes come and go at any time (`presence`). Events change what is known; then `Job::advance` does all that has become possible.
+//! them (`failing`), and are compared (`auditing`). Nodes come and go at any time (`presence`), connections and the coordinator itself begin anew (`restarting`), and
+//! several jobs share the nodes (`queue`). Events change what is known; then `Job::advance` does all that has become possible.
 
 mod auditing;
 mod command;
@@ -23,9 +24,11 @@ mod planning;
 mod presence;
 mod probing;
 mod progress;
+mod queue;
 mod record;
 mod redistribution;
 mod rendering;
+mod restarting;
 mod stealing;
 mod tail;
 #[cfg(test)]
@@ -34,9 +37,11 @@ mod turn;
 
 use std::{collections::BTreeMap, time::Duration};
 
+use serde::{Deserialize, Serialize};
+
 pub use command::{Command, DiscardReason, Outcome, Question, ToNode};
 pub use config::FarmConfig;
-pub use event::{Answer, Event, JobSpec, NodeInfo};
+pub use event::{Answer, Build, Event, JobSpec, NodeInfo};
 pub use id::{Incarnation, JobId, LeaseId, PolicyId};
 pub use node::{NodeSnapshot, NodeState};
 pub use record::{JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
@@ -44,24 +49,33 @@ pub use record::{JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
 use delivering::Delivery;
 use job::Job;
 use node::Nodes;
+use queue::Queue;
 use turn::Turn;
 
-/// The farm: nodes, and jobs of which one runs at a time, in order of submission.
+/// The farm: nodes, and jobs that share them.
 ///
 /// The shell calls [`Self::step`] with every event, in order, and carries out the commands in order; it sends [`Event::Tick`] when
 /// [`Self::next_deadline`] is reached. Deadlines strike in ticks alone. The same events at the same times give the same commands and the same state.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Farm {
     turn: Turn,
     nodes: Nodes,
     jobs: BTreeMap<JobId, Job>,
-    running: Option<JobId>,
+    queue: Queue,
+    /// Builds of earlier coordinators, of which jobs are that go on.
+    earlier_builds: Vec<Build>,
 }
 
 impl Farm {
     /// A farm without nodes and jobs.
     pub fn new(config: FarmConfig) -> Self {
-        Self { turn: Turn::new(config), nodes: Nodes::new(), jobs: BTreeMap::new(), running: None }
+        Self { turn: Turn::new(config), nodes: Nodes::new(), jobs: BTreeMap::new(), queue: Queue::default(), earlier_builds: Vec::new() }
+    }
+
+    /// A farm that another process knew, with the timeouts of this one.
+    pub fn resumed(mut self, config: FarmConfig) -> Self {
+        self.turn.config = config;
+        self
     }
 
     /// Takes note of an event at the moment `now` (since any fixed moment; it never goes back) and says what is to be done.
@@ -78,13 +92,15 @@ impl Farm {
         match event {
             Event::JobSubmitted { job, spec } => self.job_submitted(job, spec),
             Event::JobCancelled { job, reason } => self.job_cancelled(job, reason),
+            event @ (Event::JobPaused { .. } | Event::JobResumed { .. } | Event::JobRanked { .. }) => self.job_moved(event),
             Event::NodeJoined { node, incarnation, info } => self.node_joined(node, incarnation, info),
-            Event::NodeProved { node, incarnation, verdict } => self.node_proved(node, incarnation, verdict),
+            Event::NodeProved { node, incarnation, canary } => self.node_proved(node, incarnation, canary),
+            Event::NodeDraining { node, incarnation } => self.node_drains(node, incarnation),
             Event::NodeHeard { node, incarnation } => _ = self.node_heard(node, incarnation),
             Event::NodeLeft { node, incarnation, reason } => self.node_left(node, incarnation, &reason),
-            Event::Restarted => self.restarted(),
+            Event::Restarted { build } => self.restarted(build),
             Event::Tick => self.watch_nodes(),
-            Event::PolicyAnswered { id, answer } => self.with_running(|job, turn, nodes| job.policy_answered(turn, nodes, id, answer)),
+            Event::PolicyAnswered { id, answer } => self.policy_answered(id, answer),
             Event::Prepared { node, incarnation, job, result } => {
                 self.of_node(node, incarnation, job, |job, turn, nodes| job.prepared(turn, nodes, node, result))
             }
@@ -95,6 +111,7 @@ impl Farm {
                 self.rendered(job, Delivery { node, incarnation, lease, hash, seconds });
             }
             Event::RenderFailed { node, incarnation, job, lease, reason } => {
+                self.stopped(node, incarnation, job, lease);
                 self.of_node(node, incarnation, job, |job, turn, nodes| job.render_failed(turn, nodes, node, lease, &reason));
             }
             Event::Stopped { node, incarnation, job, lease } => self.stopped(node, incarnation, job, lease),
@@ -109,8 +126,8 @@ impl Farm {
 
     /// When the next [`Event::Tick`] is due; `None` while nothing but events can change anything.
     pub fn next_deadline(&self) -> Option<Duration> {
-        let job = self.running.and_then(|id| self.jobs.get(&id)).and_then(|job| job.next_deadline(&self.turn.config));
-        self.next_silence().into_iter().chain(job).min()
+        let jobs = self.open_jobs().filter_map(|job| job.next_deadline(&self.turn.config));
+        self.next_silence().into_iter().chain(jobs).min()
     }
 
     /// The farm's clock: the latest moment that it was told.
@@ -123,25 +140,17 @@ impl Farm {
         self.nodes.get(&node).is_some_and(|node| node.state == NodeState::Suspected)
     }
 
-    /// Lets the running job do what it can, then the next one.
-    fn advance(&mut self) {
-        loop {
-            self.with_running(|job, turn, nodes| job.advance(turn, nodes));
-            if self.running.and_then(|id| self.jobs.get(&id)).is_some_and(|job| job.outcome().is_none()) || !self.start_next() {
-                return;
-            }
-        }
-    }
-
-    fn with_job(&mut self, id: JobId, act: impl FnOnce(&mut Job, &mut Turn, &Nodes)) {
+    fn with_job(&mut self, id: JobId, act: impl FnOnce(&mut Job, &mut Turn, &mut Nodes)) {
         if let Some(job) = self.jobs.get_mut(&id).filter(|job| job.outcome().is_none()) {
-            act(job, &mut self.turn, &self.nodes);
+            act(job, &mut self.turn, &mut self.nodes);
         }
     }
 
-    fn with_running(&mut self, act: impl FnOnce(&mut Job, &mut Turn, &Nodes)) {
-        if let Some(id) = self.running {
-            self.with_job(id, act);
+    fn with_open(&mut self, mut act: impl FnMut(&mut Job, &mut Turn, &mut Nodes)) {
+        for id in &self.queue.open {
+            if let Some(job) = self.jobs.get_mut(id).filter(|job| job.outcome().is_none()) {
+                act(job, &mut self.turn, &mut self.nodes);
+            }
         }
     }
 
@@ -151,7 +160,7 @@ impl Farm {
         node: crate::schedule::NodeId,
         incarnation: Incarnation,
         job: JobId,
-        act: impl FnOnce(&mut Job, &mut Turn, &Nodes),
+        act: impl FnOnce(&mut Job, &mut Turn, &mut Nodes),
     ) {
         if self.node_heard(node, incarnation) {
             self.with_job(job, act);

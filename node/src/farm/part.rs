@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
 use super::{Incarnation, LeaseId, log::Log};
@@ -10,7 +11,7 @@ use crate::manifest::{AttemptEntry, AttemptOutcome, PartEntry};
 use crate::schedule::{NodeId, Part, PartId};
 
 /// Where a part is. It is in one place only. It leaves [`Place::Committed`] only when its pixels are revoked or lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Place {
     /// With no node: it waits for a policy or for a node.
     Loose,
@@ -29,7 +30,7 @@ pub(super) enum Place {
 }
 
 /// What an attempt is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Role {
     /// It is the one that its part's place names.
     Main,
@@ -42,7 +43,7 @@ pub(super) enum Role {
 }
 
 /// A part of a running job.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct PartState {
     pub id: PartId,
     pub rect: Rect,
@@ -63,7 +64,7 @@ pub(super) struct PartState {
 }
 
 /// A try at a part, for the record.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Attempt {
     pub lease: LeaseId,
     pub node: NodeId,
@@ -75,7 +76,7 @@ pub(super) struct Attempt {
 }
 
 /// An attempt that may still end well.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Lease {
     pub part: PartId,
     pub node: NodeId,

@@ -2,27 +2,37 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
-use super::job::{Job, Phase};
+use super::job::{Job, Member, Phase};
 use super::node::Nodes;
 use super::part::{PartState, Place};
 use super::turn::Turn;
-use super::{Answer, Command, Outcome, PolicyId, Question};
+use super::{Answer, Command, Farm, Outcome, PolicyId, Question};
 use crate::manifest::EventKind;
 use crate::schedule::assign::{self, Backlog};
-use crate::schedule::{Assign, NodePower, Part, PartId, Plan, Split, evaluate, split};
+use crate::schedule::{Assign, NodeId, NodePower, Part, PartId, Plan, Split, evaluate, split};
 
 /// A question to the job's own policy.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Pending {
     id: PolicyId,
     pub deadline: Duration,
     question: Question,
 }
 
+impl Farm {
+    pub(super) fn policy_answered(&mut self, id: PolicyId, answer: Result<Answer, String>) {
+        let asked = self.open_jobs().find(|job| job.question.as_ref().is_some_and(|pending| pending.id == id)).map(|job| job.id);
+        if let Some(asked) = asked {
+            self.with_job(asked, |job, turn, nodes| job.policy_answered(turn, nodes, id, answer));
+        }
+    }
+}
+
 impl Job {
-    pub(super) fn advance_planning(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn advance_planning(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if self.phase == Phase::Splitting && self.question.is_none() {
             self.split(turn, nodes);
         }
@@ -31,7 +41,7 @@ impl Job {
         }
     }
 
-    fn split(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    fn split(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let (width, height) = (self.spec.width, self.spec.height);
         let rects = match self.spec.split {
             Split::Grid { width: columns, height: rows } => split::grid(width, height, columns, rows),
@@ -47,7 +57,7 @@ impl Job {
         self.take_split(turn, nodes, rects);
     }
 
-    fn take_split(&mut self, turn: &mut Turn, nodes: &Nodes, rects: Vec<Rect>) {
+    fn take_split(&mut self, turn: &mut Turn, nodes: &mut Nodes, rects: Vec<Rect>) {
         if let Err(wrong) = split::validate(&rects, self.spec.width, self.spec.height) {
             return self.end(turn, nodes, Outcome::Failed { reason: format!("split: {wrong}") });
         }
@@ -59,12 +69,12 @@ impl Job {
         self.phase = Phase::Assigning;
     }
 
-    fn assign(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    fn assign(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let (parts, powers) = (self.hardest_first(), self.usable_powers(nodes));
         if powers.is_empty() {
             return;
         }
-        match self.built_in(&parts, &powers) {
+        match self.built_in(nodes, &parts, &powers) {
             Some(plan) => self.begin_rendering(turn, nodes, plan),
             None => self.ask(turn, Question::Assign { parts, nodes: powers }),
         }
@@ -77,25 +87,25 @@ impl Job {
     }
 
     /// What the job's policy says, where it is a built-in one.
-    pub(super) fn built_in(&self, parts: &[Part], powers: &[NodePower]) -> Option<Plan> {
+    pub(super) fn built_in(&self, nodes: &Nodes, parts: &[Part], powers: &[NodePower]) -> Option<Plan> {
         match self.spec.assign {
             Assign::Naive => Some(assign::naive(parts, powers)),
-            Assign::Paper => Some(assign::paper(parts, powers, &self.backlog())),
-            Assign::EarliestFinish => Some(assign::earliest_finish(parts, powers, &self.backlog())),
+            Assign::Paper => Some(assign::paper(parts, powers, &self.backlog(nodes))),
+            Assign::EarliestFinish => Some(assign::earliest_finish(parts, powers, &self.backlog(nodes))),
             Assign::Script => None,
         }
     }
 
     /// Cost that waits at every node, handed out or not.
-    pub(super) fn backlog(&self) -> Backlog {
-        let of = |member: &super::job::Member| {
-            let held = member.held.iter().filter_map(|lease| self.leases.get(lease)).map(|lease| lease.part);
-            held.chain(member.queue.iter().copied()).map(|part| self.part(part).expected).sum()
+    pub(super) fn backlog(&self, nodes: &Nodes) -> Backlog {
+        let of = |(id, member): (&NodeId, &Member)| {
+            let held = self.held_by(nodes, *id).map(|lease| lease.part);
+            (*id, held.chain(member.queue.iter().copied()).map(|part| self.part(part).expected).sum())
         };
-        self.members.iter().map(|(id, member)| (*id, of(member))).collect()
+        self.members.iter().map(of).collect()
     }
 
-    fn begin_rendering(&mut self, turn: &mut Turn, nodes: &Nodes, plan: Plan) {
+    fn begin_rendering(&mut self, turn: &mut Turn, nodes: &mut Nodes, plan: Plan) {
         for (part, node) in &plan {
             self.part_mut(*part).planned = Some(*node);
         }
@@ -106,7 +116,7 @@ impl Job {
 
     /// Puts parts in the queues of the nodes that a plan gives them to. Parts of nodes that are lost by now stay loose, as do parts that were
     /// delivered meanwhile.
-    pub(super) fn carry_out(&mut self, nodes: &Nodes, plan: &Plan) {
+    pub(super) fn carry_out(&mut self, nodes: &mut Nodes, plan: &Plan) {
         let mut touched = std::collections::BTreeSet::new();
         for (part, node) in plan {
             if self.part(*part).place != Place::Loose || !self.usable(nodes, *node) {
@@ -138,19 +148,19 @@ impl Job {
     }
 
     /// The job's own policy answered. Answers that come too late name a question that is not asked any more.
-    pub fn policy_answered(&mut self, turn: &mut Turn, nodes: &Nodes, id: PolicyId, answer: Result<Answer, String>) {
+    pub fn policy_answered(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: PolicyId, answer: Result<Answer, String>) {
         if let Some(pending) = self.question.take_if(|pending| pending.id == id) {
             self.take_answer(turn, nodes, &pending.question, answer);
         }
     }
 
-    pub(super) fn watch_question(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn watch_question(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if let Some(pending) = self.question.take_if(|pending| turn.strikes(pending.deadline)) {
             self.take_answer(turn, nodes, &pending.question, Err("the job's own policy took too long".into()));
         }
     }
 
-    fn take_answer(&mut self, turn: &mut Turn, nodes: &Nodes, question: &Question, answer: Result<Answer, String>) {
+    fn take_answer(&mut self, turn: &mut Turn, nodes: &mut Nodes, question: &Question, answer: Result<Answer, String>) {
         let checked = answer.and_then(|answer| check(question, answer));
         match (question, checked) {
             (_, Ok(Answer::Split(rects))) => self.take_split(turn, nodes, rects),

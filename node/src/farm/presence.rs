@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::auditing::quarantined;
 use super::node::{Node, NodeState};
-use super::{Command, Farm, FarmConfig, Incarnation, JobId, NodeInfo, ToNode};
+use super::{Command, Farm, FarmConfig, Incarnation, NodeInfo, ToNode};
 use crate::limits::NODES;
 use crate::manifest::EventKind;
 use crate::schedule::NodeId;
@@ -37,37 +37,47 @@ impl Farm {
             _ => {}
         }
         let (name, heard) = (info.name.clone(), self.turn.now);
-        let joined = Node { incarnation, info, state: NodeState::Proving, proved: false, reason: String::new(), heard };
-        self.nodes.insert(node, joined);
+        self.nodes.insert(node, Node::new(incarnation, info, heard));
         self.note(EventKind::Joined, node, format!("{name} joined"));
         self.send(node, ToNode::Prove);
     }
 
-    /// A renewed connection may have swallowed what was said before.
-    fn repeat_orders(&mut self, node: NodeId) {
-        if self.nodes.get(&node).is_some_and(|known| known.state == NodeState::Proving) {
-            self.send(node, ToNode::Prove);
-        }
-        self.with_running(|job, turn, nodes| job.repeat_orders(turn, nodes, node));
-    }
-
-    pub(super) fn node_proved(&mut self, node: NodeId, incarnation: Incarnation, verdict: Result<(), String>) {
+    /// A node has rendered the canary part: to what coordinators of this farm rendered it to, or not.
+    pub(super) fn node_proved(&mut self, node: NodeId, incarnation: Incarnation, canary: [u8; 32]) {
         if !self.node_heard(node, incarnation) {
             return;
         }
+        let mut builds = self.earlier_builds.iter().chain(&self.turn.build);
+        let right = builds.any(|build| build.canary == canary);
         let Some(known) = self.nodes.get_mut(&node).filter(|known| known.state == NodeState::Proving) else { return };
-        match verdict {
-            Ok(()) => {
-                (known.state, known.proved) = (NodeState::Ready, true);
-                self.with_running(|job, turn, nodes| job.enlist(turn, nodes, node));
-            }
-            Err(reason) => {
-                known.state = NodeState::Refused;
-                known.reason.clone_from(&reason);
-                self.note(EventKind::Refused, node, reason.clone());
-                self.turn.put(Command::Close { node, incarnation, reason });
-            }
+        if right {
+            known.proof = Some(canary);
+            known.state = known.present();
+            self.with_open(|job, turn, nodes| job.enlist(turn, nodes, node));
+            return;
         }
+        let reason = format!(
+            "it renders the canary part to other bytes than the coordinator: its build ({}) or its processor computes differently; nodes are upgraded after their coordinator",
+            known.info.build
+        );
+        known.state = NodeState::Refused;
+        known.reason.clone_from(&reason);
+        self.note(EventKind::Refused, node, reason.clone());
+        self.turn.put(Command::Close { node, incarnation, reason });
+    }
+
+    /// A node is about to go: it gets nothing new, and gives back what its lanes have not begun.
+    pub(super) fn node_drains(&mut self, node: NodeId, incarnation: Incarnation) {
+        if !self.node_heard(node, incarnation) {
+            return;
+        }
+        let Some(known) = self.nodes.get_mut(&node).filter(|known| !known.leaving) else { return };
+        known.leaving = true;
+        if known.proof.is_some() {
+            known.state = NodeState::Draining;
+        }
+        self.note(EventKind::Draining, node, "it finishes what its lanes render, then goes".into());
+        self.with_open(|job, turn, nodes| job.node_drains(turn, nodes, node));
     }
 
     /// Takes note of a sign of life; says whether this life goes on.
@@ -75,9 +85,9 @@ impl Farm {
         let Some(known) = self.nodes.get_mut(&node).filter(|known| known.lives(incarnation)) else { return false };
         known.heard = known.heard.max(self.turn.at);
         if known.state == NodeState::Suspected {
-            known.state = if known.proved { NodeState::Ready } else { NodeState::Proving };
+            known.state = known.present();
             self.note(EventKind::Recovered, node, "heard again".into());
-            self.with_running(|job, turn, nodes| job.node_recovered(turn, nodes, node));
+            self.with_open(|job, turn, nodes| job.node_recovered(turn, nodes, node));
         }
         true
     }
@@ -103,7 +113,7 @@ impl Farm {
             }
             node.state = NodeState::Suspected;
             self.note(EventKind::Suspected, id, format!("silent for {silence:.2} s"));
-            self.with_running(|job, turn, nodes| job.node_suspected(turn, nodes, id));
+            self.with_open(|job, turn, nodes| job.node_suspected(turn, nodes, id));
         }
     }
 
@@ -111,34 +121,25 @@ impl Farm {
         self.nodes.values().filter_map(|node| node.next_silence(&self.turn.config)).min()
     }
 
-    /// The coordinator was started anew: no connection is left, and names that it gave without having them on disk must not come again.
-    pub(super) fn restarted(&mut self) {
-        self.turn.next_epoch();
-        let now = self.turn.now;
-        self.nodes.values_mut().for_each(|node| node.heard = now);
-        let jobs: Vec<JobId> = self.jobs.keys().copied().collect();
-        for job in jobs {
-            self.with_job(job, |job, turn, _| job.restarted(turn));
-        }
-    }
-
     /// The life of a node is over: it `crashed`, for all that is known, or went.
     fn lose(&mut self, node: NodeId, reason: &str, crashed: bool) {
         let Some(known) = self.nodes.get_mut(&node) else { return };
         let refused = known.state == NodeState::Refused;
         known.state = NodeState::Lost;
-        known.proved = false;
+        known.proof = None;
+        known.leaving = false;
         known.heard = self.turn.now;
         known.reason = reason.to_owned();
         if !refused {
             self.note(EventKind::Lost, node, reason.to_owned());
         }
         let reason = reason.to_owned();
-        self.with_running(|job, turn, nodes| job.node_lost(turn, nodes, node, &reason, crashed));
+        self.with_open(|job, turn, nodes| job.node_lost(turn, nodes, node, &reason, crashed));
+        self.nodes.entry(node).and_modify(Node::empty);
     }
 
     fn note(&mut self, kind: EventKind, node: NodeId, detail: String) {
-        self.with_running(|job, turn, _| job.log.event(turn.now, kind, Some(node), Vec::new(), detail));
+        self.with_open(|job, turn, _| job.log.event(turn.now, kind, Some(node), Vec::new(), detail.clone()));
     }
 
     fn send(&mut self, node: NodeId, message: ToNode) {
@@ -152,7 +153,7 @@ impl Node {
     /// When its silence will mean more than it does now.
     fn next_silence(&self, config: &FarmConfig) -> Option<Duration> {
         match self.state {
-            NodeState::Proving | NodeState::Ready => Some(self.heard + config.suspect_after),
+            NodeState::Proving | NodeState::Ready | NodeState::Draining => Some(self.heard + config.suspect_after),
             NodeState::Suspected | NodeState::Refused => Some(self.heard + config.dead_after),
             NodeState::Lost | NodeState::Quarantined => None,
         }

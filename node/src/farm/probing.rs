@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
+
 use super::ToNode;
 use super::job::{Job, Phase, Stage};
 use super::node::Nodes;
@@ -13,7 +15,7 @@ use crate::schedule::probe::{self, Cells};
 use crate::schedule::{NodeId, Probe};
 
 /// A running probe.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Probing {
     pub cells: Cells,
     started: Duration,
@@ -27,7 +29,7 @@ pub(super) struct Probing {
 }
 
 /// How the speed of a node that comes later becomes known.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Pricing {
     /// Not yet.
     Unknown,
@@ -40,7 +42,7 @@ pub(super) enum Pricing {
 }
 
 impl Job {
-    pub(super) fn begin_probe(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn begin_probe(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         self.log.event(turn.now, EventKind::ProbeStarted, None, Vec::new(), "");
         let scale = match &self.spec.probe {
             Probe::EveryNode { scale } | Probe::Shared { scale } => *scale,
@@ -67,7 +69,7 @@ impl Job {
         shares.iter().for_each(|(node, share)| self.hand_out(turn, nodes, *node, share));
     }
 
-    fn hand_out(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, share: &[u32]) {
+    fn hand_out(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, share: &[u32]) {
         let (Phase::Probing(probing), Some(node)) = (&mut self.phase, nodes.get(&id)) else { return };
         if !share.is_empty() {
             probing.outstanding.entry(id).or_default().extend(share);
@@ -76,7 +78,7 @@ impl Job {
     }
 
     /// A node has the scene: if the probe is on or over, it is measured by the common patch, where a measurement is needed.
-    pub(super) fn probe_latecomer(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
+    pub(super) fn probe_latecomer(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
         match (&self.phase, &self.pricing) {
             (Phase::Probing(probing), _) => {
                 let (cells, share) = (probing.cells, self.unmeasured());
@@ -129,7 +131,7 @@ impl Job {
     }
 
     /// A node is lost while the probe is on: its cells go to the others.
-    pub(super) fn probe_without(&mut self, turn: &mut Turn, nodes: &Nodes, lost: NodeId) {
+    pub(super) fn probe_without(&mut self, turn: &mut Turn, nodes: &mut Nodes, lost: NodeId) {
         let Phase::Probing(probing) = &mut self.phase else { return };
         probing.outstanding.remove(&lost);
         let others: Vec<(NodeId, u32)> = self
@@ -143,7 +145,7 @@ impl Job {
         }
     }
 
-    pub(super) fn advance_probing(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn advance_probing(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         let Phase::Probing(probing) = &mut self.phase else { return };
         let done = |id: &NodeId, cells: &BTreeSet<u32>| cells.is_empty() && nodes.get(id).is_some_and(|node| node.is_ready());
         let (asked, answered) = (probing.outstanding.len(), probing.outstanding.iter().filter(|(id, cells)| done(id, cells)).count());

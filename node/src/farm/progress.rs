@@ -4,7 +4,7 @@
 //! any other lane none at all. The part's cost is taken to be at least what it took by then, so that a part that is only hard is
 //! tried again less and less eagerly.
 
-use super::job::Job;
+use super::job::{Job, Member};
 use super::node::Nodes;
 use super::part::Role;
 use super::turn::Turn;
@@ -15,39 +15,42 @@ use crate::schedule::NodeId;
 impl Farm {
     /// A node has stopped an attempt, as it was told: the lane goes on.
     pub(super) fn stopped(&mut self, node: NodeId, incarnation: Incarnation, job: JobId, lease: LeaseId) {
-        self.of_node(node, incarnation, job, |job, turn, _| job.lane_is_free(turn, node, lease));
-    }
-}
-
-impl Job {
-    pub(super) fn watch_progress(&mut self, turn: &mut Turn, nodes: &Nodes) {
-        let late = |due: std::time::Duration| turn.strikes(due);
-        let open = self.leases.iter().filter(|(_, lease)| lease.role != Role::Stray);
-        let overdue: Vec<LeaseId> = open.filter(|(_, lease)| lease.due.is_some_and(late)).map(|(id, _)| *id).collect();
-        overdue.into_iter().for_each(|lease| self.is_overdue(turn, nodes, lease));
-    }
-
-    fn is_overdue(&mut self, turn: &mut Turn, nodes: &Nodes, lease: LeaseId) {
-        let Some((part, node, begun)) = self.leases.get(&lease).map(|of| (of.part, of.node, of.begun)) else { return };
-        let Some(member) = self.members.get_mut(&node) else { return };
-        let seconds = begun.map_or(0.0, |begun| turn.now.saturating_sub(begun).as_secs_f64());
-        let took = seconds * member.lane_speed();
-        member.hanging.insert(lease);
-        let state = self.part_mut(part);
-        let detail = format!("{seconds:.1} s for what should take {:.1} s", state.expected * seconds / took.max(f64::MIN_POSITIVE));
-        state.expected = state.expected.max(took);
-        self.log.event(turn.now, EventKind::Overdue, Some(node), vec![part], detail);
-        self.set_aside(lease);
-        if self.members.get(&node).is_some_and(|member| member.lanes() == 0) {
-            self.strip(turn, node, "no lane of its node makes progress");
-            self.probe_without(turn, nodes, node);
+        if self.node_heard(node, incarnation) {
+            self.lane_is_free(node, job, lease);
         }
     }
 
     /// A lane answered: it does not hang.
-    pub(super) fn lane_is_free(&mut self, turn: &Turn, node: NodeId, lease: LeaseId) {
-        if self.members.get_mut(&node).is_some_and(|member| member.hanging.remove(&lease)) {
-            self.note_begun(turn, node);
+    pub(super) fn lane_is_free(&mut self, id: NodeId, job: JobId, lease: LeaseId) {
+        if self.nodes.get_mut(&id).is_some_and(|node| node.hanging.remove(&(job, lease))) {
+            self.turn.freed.insert(id);
         }
+    }
+}
+
+impl Job {
+    pub(super) fn watch_progress(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
+        let late = |due: std::time::Duration| turn.strikes(due);
+        let open = self.leases.iter().filter(|(_, lease)| lease.role != Role::Stray);
+        let overdue: Vec<LeaseId> = open.filter(|(_, lease)| lease.due.is_some_and(late)).map(|(id, _)| *id).collect();
+        overdue.into_iter().for_each(|lease| self.is_overdue(turn, nodes, lease));
+        let holds =
+            |id: &NodeId, member: &Member| !member.queue.is_empty() || nodes.get(id).is_some_and(|node| node.held_of(self.id).count() > 0);
+        let stuck = |(id, member): &(&NodeId, &Member)| nodes.get(id).is_some_and(|node| node.lanes() == 0) && holds(id, member);
+        let stuck: Vec<NodeId> = self.members.iter().filter(stuck).map(|(id, _)| *id).collect();
+        stuck.into_iter().for_each(|id| self.strip(turn, nodes, id, "no lane of its node makes progress"));
+    }
+
+    fn is_overdue(&mut self, turn: &mut Turn, nodes: &mut Nodes, lease: LeaseId) {
+        let Some((part, node, begun)) = self.leases.get(&lease).map(|of| (of.part, of.node, of.begun)) else { return };
+        let Some(member) = self.members.get(&node) else { return };
+        let seconds = begun.map_or(0.0, |begun| turn.now.saturating_sub(begun).as_secs_f64());
+        let took = seconds * member.lane_speed();
+        let state = self.part_mut(part);
+        let detail = format!("{seconds:.1} s for what should take {:.1} s", state.expected * seconds / took.max(f64::MIN_POSITIVE));
+        state.expected = state.expected.max(took);
+        self.log.event(turn.now, EventKind::Overdue, Some(node), vec![part], detail);
+        nodes.entry(node).and_modify(|node| _ = node.hanging.insert((self.id, lease)));
+        self.set_aside(turn, nodes, lease);
     }
 }

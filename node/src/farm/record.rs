@@ -5,9 +5,9 @@ use std::time::Duration;
 use serde::Serialize;
 use tessera_engine::part::Rect;
 
-use super::job::{Job, Phase};
+use super::job::{Job, Member, Phase};
 use super::part::{PartState, Place};
-use super::{Farm, JobId, JobSpec, LeaseId, NodeSnapshot, Outcome};
+use super::{Build, Farm, JobId, JobSpec, LeaseId, NodeSnapshot, Outcome};
 use crate::manifest::{AttemptOutcome, EventEntry, NodeEntry, PartEntry, ProbeEntry};
 use crate::schedule::{NodeId, Part, PartId, Probe, evaluate};
 
@@ -38,6 +38,12 @@ pub struct JobSnapshot {
     pub id: JobId,
     /// Its name.
     pub name: String,
+    /// Who submitted it.
+    pub owner: String,
+    /// Its rank.
+    pub priority: i32,
+    /// Whether someone wants it to wait.
+    pub paused: bool,
     /// How far it is.
     pub phase: JobPhase,
     /// How it ended.
@@ -86,6 +92,8 @@ pub struct JobRecord {
     pub id: JobId,
     /// What was asked for.
     pub spec: JobSpec,
+    /// What it is rendered with, once it has begun.
+    pub build: Option<Build>,
     /// How it ended; `None` while it has not.
     pub outcome: Option<Outcome>,
     /// The farm's clock at its submission.
@@ -122,9 +130,8 @@ impl Farm {
 
     /// All nodes that ever joined, in order of their ids.
     pub fn nodes(&self) -> Vec<NodeSnapshot> {
-        let running = self.running.and_then(|id| self.jobs.get(&id));
         let of = |(id, node): (&NodeId, &super::node::Node)| {
-            let member = running.and_then(|job| job.members.get(id));
+            let members = || self.open_jobs().filter_map(|job| job.members.get(id));
             NodeSnapshot {
                 id: *id,
                 incarnation: node.incarnation,
@@ -134,9 +141,9 @@ impl Farm {
                 address: node.info.address.clone(),
                 state: node.state,
                 reason: node.reason.clone(),
-                power: member.and_then(|member| member.power()),
-                holds: member.map_or(0, |member| member.held.len()),
-                queued: member.map_or(0, |member| member.queue.len()),
+                power: members().find_map(Member::power),
+                holds: node.held.len(),
+                queued: members().map(|member| member.queue.len()).sum(),
             }
         };
         self.nodes.iter().map(of).collect()
@@ -181,6 +188,9 @@ fn snapshot(job: &Job, now: Duration) -> JobSnapshot {
     JobSnapshot {
         id: job.id,
         name: job.spec.name.clone(),
+        owner: job.spec.owner.clone(),
+        priority: job.spec.priority,
+        paused: job.paused,
         phase: phase(&job.phase),
         outcome: job.outcome().cloned(),
         parts: job.split_into,
@@ -209,6 +219,7 @@ fn record(job: &Job, now: Duration) -> JobRecord {
     JobRecord {
         id: job.id,
         spec: job.spec.clone(),
+        build: job.build,
         outcome: job.outcome().cloned(),
         submitted: job.log.submitted,
         seconds: job.log.at(job.log.ended.unwrap_or(now)),

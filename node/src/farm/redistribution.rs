@@ -1,7 +1,7 @@
 //! Parts lose their node and get another.
 
 use super::job::{Job, Phase, Stage};
-use super::node::Nodes;
+use super::node::{Held, Nodes};
 use super::part::{Lease, Place, Role};
 use super::turn::Turn;
 use super::{LeaseId, Question};
@@ -11,23 +11,46 @@ use crate::schedule::{NodeId, Part, PartId, Plan};
 
 impl Job {
     /// A node is silent: what it had to do goes to others. Its attempts may still end well.
-    pub fn node_suspected(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
-        self.strip(turn, id, "its node was suspected");
+    pub fn node_suspected(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
+        self.strip(turn, nodes, id, "its node was suspected");
+        self.probe_without(turn, nodes, id);
+    }
+
+    /// A node is about to go: what its lanes have not begun goes to others.
+    pub fn node_drains(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
+        let waiting = |lease: &LeaseId| self.leases.get(lease).is_some_and(|of| of.begun.is_none());
+        let held: Vec<LeaseId> = nodes.get(&id).map(|node| node.held_of(self.id).filter(waiting).collect()).unwrap_or_default();
+        let queued: Vec<PartId> = self.members.get(&id).map(|member| member.queue.iter().copied().collect()).unwrap_or_default();
+        let mut parts = queued.clone();
+        for lease in held {
+            self.call_back(turn, nodes, lease);
+            let Some((part, role)) = self.leases.get(&lease).map(|of| (of.part, of.role)) else { continue };
+            self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "its node is about to go");
+            if role == Role::Main {
+                self.loosen(part);
+                parts.push(part);
+            }
+        }
+        queued.into_iter().for_each(|part| self.unplace(part));
+        if !parts.is_empty() {
+            self.log.event(turn.now, EventKind::Reassigned, Some(id), parts, "its node is about to go");
+        }
         self.probe_without(turn, nodes, id);
     }
 
     /// A node is heard again: attempts of it whose parts nobody has begun anew count again.
-    pub fn node_recovered(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
+    pub fn node_recovered(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
         let strays: Vec<(LeaseId, PartId)> =
             self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.part)).collect();
         for (lease, part) in strays {
-            let hangs = self.members.get(&id).is_some_and(|member| member.hanging.contains(&lease));
+            let hangs = nodes.get(&id).is_some_and(|node| node.hanging.contains(&(self.id, lease)));
             if !hangs && matches!(self.part(part).place, Place::Loose | Place::Queued(_)) {
                 self.unplace(part);
                 self.loose.remove(&part);
                 self.part_mut(part).place = Place::Leased(lease);
                 self.leases.entry(lease).and_modify(|lease| lease.role = Role::Main);
-                self.members.entry(id).and_modify(|member| member.held.push(lease));
+                let held = Held { job: self.id, lease, suspect: self.part(part).suspect };
+                nodes.entry(id).and_modify(|node| node.held.push(held));
             }
         }
         if self.members.get(&id).is_some_and(|member| member.stage == Stage::Prepared) {
@@ -38,31 +61,30 @@ impl Job {
 
     /// The life of a node is over: nothing of it counts any more.
     /// If it `crashed`, it may have been for what its lanes rendered.
-    pub fn node_lost(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, reason: &str, crashed: bool) {
-        self.strip(turn, id, "its node was lost");
+    pub fn node_lost(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, reason: &str, crashed: bool) {
+        self.strip(turn, nodes, id, "its node was lost");
         let void: Vec<(LeaseId, Lease)> =
             self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.clone())).collect();
         for (lease, of) in &void {
-            self.close(turn, *lease, AttemptOutcome::Lost, reason);
+            self.close(turn, nodes, *lease, AttemptOutcome::Lost, reason);
             if crashed && of.begun.is_some() && of.role != Role::Audit {
                 self.part_mut(of.part).failures.push((id, format!("it was lost meanwhile: {reason}")));
             }
         }
         if let Some(member) = self.members.get_mut(&id) {
             member.stage = Stage::Away;
-            member.hanging.clear();
         }
         self.probe_without(turn, nodes, id);
         void.into_iter().for_each(|(_, of)| self.consider_failures(turn, nodes, of.part));
     }
 
     /// Takes everything undelivered from a node.
-    pub(super) fn strip(&mut self, turn: &mut Turn, id: NodeId, why: &str) {
-        let Some(member) = self.members.get_mut(&id) else { return };
-        let (held, queued) = (std::mem::take(&mut member.held), member.queue.clone());
+    pub(super) fn strip(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, why: &str) {
+        let Some(queued) = self.members.get(&id).map(|member| member.queue.clone()) else { return };
+        let held: Vec<LeaseId> = nodes.get(&id).map(|node| node.held_of(self.id).collect()).unwrap_or_default();
         let main = held.iter().filter_map(|lease| self.leases.get(lease)).filter(|lease| lease.role == Role::Main).map(|lease| lease.part);
         let parts: Vec<PartId> = main.chain(queued.iter().copied()).collect();
-        held.into_iter().for_each(|lease| self.set_aside(lease));
+        held.into_iter().for_each(|lease| self.set_aside(turn, nodes, lease));
         queued.into_iter().for_each(|part| self.unplace(part));
         if !parts.is_empty() {
             self.log.event(turn.now, EventKind::Reassigned, Some(id), parts, why);
@@ -81,7 +103,7 @@ impl Job {
     }
 
     /// Gives loose parts to the nodes that are there, by the job's own policy.
-    pub(super) fn redistribute(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn redistribute(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if self.phase != Phase::Rendering || self.loose.is_empty() || self.question.is_some() {
             return;
         }
@@ -89,31 +111,31 @@ impl Job {
         if powers.is_empty() {
             return;
         }
-        match self.built_in(&parts, &powers) {
+        match self.built_in(nodes, &parts, &powers) {
             Some(plan) => self.take_redistribution(turn, nodes, &parts, &plan),
             None => self.ask(turn, Question::Redistribute { parts, nodes: powers }),
         }
     }
 
     /// Carries out a plan for loose parts, but gives no part to a node that failed at it while there is another.
-    pub(super) fn take_redistribution(&mut self, turn: &mut Turn, nodes: &Nodes, parts: &[Part], plan: &Plan) {
+    pub(super) fn take_redistribution(&mut self, turn: &mut Turn, nodes: &mut Nodes, parts: &[Part], plan: &Plan) {
         let mut plan = plan.clone();
         let failed = |part: &&Part| plan.get(&part.id).is_some_and(|node| self.part(part.id).failed_on(*node));
         for part in parts.iter().filter(failed).collect::<Vec<_>>() {
             let mut others = self.usable_powers(nodes);
             others.retain(|node| !self.part(part.id).failed_on(node.id));
-            plan.extend(assign::earliest_finish(std::slice::from_ref(part), &others, &self.backlog()));
+            plan.extend(assign::earliest_finish(std::slice::from_ref(part), &others, &self.backlog(nodes)));
         }
         self.carry_out(nodes, &plan);
         self.redistribute(turn, nodes); // what a node got that was lost while the policy thought
     }
 
     /// The job's own policy failed, or is late: the built-in one decides.
-    pub(super) fn replace_policy(&mut self, turn: &mut Turn, nodes: &Nodes, reason: &str) {
+    pub(super) fn replace_policy(&mut self, turn: &mut Turn, nodes: &mut Nodes, reason: &str) {
         self.log.event(turn.now, EventKind::PolicyReplaced, None, Vec::from_iter(self.loose.iter().copied()), reason);
         self.log.warn(format!("parts were redistributed by earliest_finish instead of the job's own policy: {reason}"));
         let (parts, powers) = (self.hardest_first(), self.usable_powers(nodes));
-        let plan = assign::earliest_finish(&parts, &powers, &self.backlog());
+        let plan = assign::earliest_finish(&parts, &powers, &self.backlog(nodes));
         self.take_redistribution(turn, nodes, &parts, &plan);
     }
 }

@@ -1,7 +1,9 @@
 //! Parts are handed out to nodes.
 
-use super::job::{Job, Member, Phase};
-use super::node::Nodes;
+use std::time::Duration;
+
+use super::job::{Job, Phase};
+use super::node::{Held, Node, Nodes};
 use super::part::{Lease, Place, Role};
 use super::turn::Turn;
 use super::{Command, Outcome, ToNode};
@@ -10,7 +12,7 @@ use crate::manifest::EventKind;
 use crate::schedule::{Assign, NodeId, PartId};
 
 impl Job {
-    pub(super) fn advance_rendering(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    pub(super) fn advance_rendering(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if self.phase != Phase::Rendering {
             return;
         }
@@ -31,7 +33,7 @@ impl Job {
     }
 
     /// All pixels are here: files can be written.
-    fn finish(&mut self, turn: &mut Turn, nodes: &Nodes) {
+    fn finish(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if !self.is_settled() || self.parts.is_empty() || self.awaits_audit(nodes) {
             return;
         }
@@ -46,36 +48,46 @@ impl Job {
     }
 
     /// Hands a node as many parts of its own queue as it may hold.
-    pub(super) fn fill(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId) {
+    pub(super) fn fill(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
         while self.has_room(turn, nodes, id) {
-            let Some(member) = self.members.get_mut(&id) else { return };
-            let Some(part) = member.queue.front().copied().filter(|part| member.held.is_empty() || !self.parts[part.0 as usize].suspect)
-            else {
+            let Some(part) = self.members.get(&id).and_then(|member| member.queue.front().copied()) else { return };
+            if self.part(part).suspect && !self.is_alone(nodes, id) {
                 return;
-            };
-            member.queue.pop_front();
+            }
+            self.members.entry(id).and_modify(|member| _ = member.queue.pop_front());
             self.hand_over(turn, nodes, id, part);
         }
     }
 
+    /// Whether a node may get a part of this job now.
     pub(super) fn has_room(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
-        let room = |member: &Member| member.held.len() < member.capacity(&turn.config) && !self.holds_suspect(member);
-        self.usable(nodes, id) && self.members.get(&id).is_some_and(room)
+        let room = |node: &Node| node.held.len() < node.capacity(&turn.config) && !node.is_isolated();
+        self.may_hand_out(turn) && self.usable(nodes, id) && nodes.get(&id).is_some_and(room)
     }
 
-    /// Whether a node renders a part that it may die of: alone, so that no other part is blamed for it.
-    fn holds_suspect(&self, member: &Member) -> bool {
-        member.held.iter().filter_map(|lease| self.leases.get(lease)).any(|lease| self.part(lease.part).suspect)
+    /// Whether the job may hand out anything now.
+    fn may_hand_out(&self, turn: &Turn) -> bool {
+        !self.paused && turn.quota > 0
+    }
+
+    /// Whether a node holds nothing, so that no other part is blamed if it dies of one.
+    pub(super) fn is_alone(&self, nodes: &Nodes, id: NodeId) -> bool {
+        nodes.get(&id).is_some_and(|node| node.held.is_empty())
+    }
+
+    /// Whether a lane of a node has nothing to do.
+    pub(super) fn is_idle(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
+        let waits = self.members.get(&id).is_some_and(|member| !member.queue.is_empty());
+        !waits && self.has_room(turn, nodes, id) && nodes.get(&id).is_some_and(|node| node.free_lanes() > 0)
     }
 
     /// Nodes that have nothing to do on some lane.
-    pub(super) fn idle(&self, nodes: &Nodes, ids: &[NodeId]) -> Vec<NodeId> {
-        let idle = |member: &Member| member.is_idle() && !self.holds_suspect(member);
-        ids.iter().copied().filter(|id| self.usable(nodes, *id) && self.members.get(id).is_some_and(idle)).collect()
+    pub(super) fn idle(&self, turn: &Turn, nodes: &Nodes, ids: &[NodeId]) -> Vec<NodeId> {
+        ids.iter().copied().filter(|id| self.is_idle(turn, nodes, *id)).collect()
     }
 
     /// Hands a part, which is in no queue, to a node.
-    pub(super) fn hand_over(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, part: PartId) {
+    pub(super) fn hand_over(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, part: PartId) {
         if let Some(lease) = self.lease(turn, nodes, id, part, Role::Main) {
             self.loose.remove(&part);
             self.part_mut(part).place = Place::Leased(lease);
@@ -83,29 +95,32 @@ impl Job {
     }
 
     /// Lets a node attempt a part.
-    pub(super) fn lease(&mut self, turn: &mut Turn, nodes: &Nodes, id: NodeId, part: PartId, role: Role) -> Option<super::LeaseId> {
-        let (member, node) = (self.members.get_mut(&id)?, nodes.get(&id)?);
+    pub(super) fn lease(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, part: PartId, role: Role) -> Option<super::LeaseId> {
+        let node = nodes.get_mut(&id)?;
         let lease = turn.lease();
-        member.held.push(lease);
-        self.leases.insert(lease, Lease { part, node: id, incarnation: member.incarnation, role, begun: None, due: None });
+        self.leases.insert(lease, Lease { part, node: id, incarnation: node.incarnation, role, begun: None, due: None });
         let state = self.part_mut(part);
         state.begin_attempt(lease, id, turn.now);
-        let rect = state.rect;
-        self.note_begun(turn, id);
-        self.log.first_lease.get_or_insert(turn.now);
+        let (rect, suspect, cost) = (state.rect, state.suspect, state.expected);
+        node.held.push(Held { job: self.id, lease, suspect });
+        turn.quota = turn.quota.saturating_sub(1);
+        turn.handed_out = (turn.handed_out.0 + 1, turn.handed_out.1 + cost);
         turn.send(id, node, ToNode::Render { job: self.id, lease, rect, samples: self.all_samples() });
+        self.note_begun(turn, nodes, id);
+        self.log.first_lease.get_or_insert(turn.now);
         Some(lease)
     }
 
-    /// The first attempts that a node holds, as many as it has lanes, are taken to have begun.
-    pub(super) fn note_begun(&mut self, turn: &Turn, id: NodeId) {
-        let Some(member) = self.members.get(&id) else { return };
-        for lease in member.held.iter().take(member.lanes()) {
-            let Some(lease) = self.leases.get_mut(lease).filter(|lease| lease.begun.is_none()) else { continue };
+    /// The first attempts that a node holds, as many as it has lanes, are taken to have begun, of whatever job they are.
+    pub(super) fn note_begun(&mut self, turn: &Turn, nodes: &Nodes, id: NodeId) {
+        let (Some(member), Some(node)) = (self.members.get(&id), nodes.get(&id)) else { return };
+        for held in node.held.iter().take(node.lanes()).filter(|held| held.job == self.id) {
+            let Some(lease) = self.leases.get_mut(&held.lease).filter(|lease| lease.begun.is_none()) else { continue };
             let predicted = self.parts[lease.part.0 as usize].expected / member.lane_speed();
             let patience = OVERDUE_AFTER.as_secs_f64().max(predicted * OVERDUE_FACTOR).min(1e9);
-            lease.begun = Some(turn.now);
-            lease.due = Some(turn.now + std::time::Duration::from_secs_f64(patience));
+            let due = turn.now + Duration::from_secs_f64(patience);
+            (lease.begun, lease.due) = (Some(turn.now), Some(due));
+            self.next_due = Some(self.next_due.map_or(due, |next| next.min(due)));
         }
     }
 }

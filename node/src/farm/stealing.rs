@@ -51,13 +51,13 @@ struct Victim {
 
 impl Job {
     /// Lets nodes with room take parts from others; asks to be woken while some find nothing that is worth it.
-    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &Nodes, ids: &[NodeId]) {
+    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
         self.reconsider = None;
         let thieves: Vec<NodeId> = ids.iter().copied().filter(|id| self.has_room(turn, nodes, *id)).collect();
         if thieves.is_empty() {
             return;
         }
-        let mut victims: Vec<Victim> = ids.iter().filter_map(|id| self.victim(turn.now, *id)).collect();
+        let mut victims: Vec<Victim> = ids.iter().filter_map(|id| self.victim(turn.now, nodes, *id)).collect();
         for thief in thieves {
             while self.has_room(turn, nodes, thief) && self.steal_one(turn, nodes, thief, &mut victims) {}
         }
@@ -66,18 +66,18 @@ impl Job {
         }
     }
 
-    fn steal_one(&mut self, turn: &mut Turn, nodes: &Nodes, thief: NodeId, victims: &mut Vec<Victim>) -> bool {
+    fn steal_one(&mut self, turn: &mut Turn, nodes: &mut Nodes, thief: NodeId, victims: &mut Vec<Victim>) -> bool {
         let Some(at) =
             (0..victims.len()).filter(|i| victims[*i].id != thief).max_by(|a, b| victims[*a].finish.total_cmp(&victims[*b].finish))
         else {
             return false;
         };
         let victim = &victims[at];
-        let Some(part) = self.loot(turn.now, thief, victim) else { return false };
+        let Some(part) = self.loot(turn.now, nodes, thief, victim) else { return false };
         let from = victim.id;
         self.take_away(turn, nodes, from, part);
         self.hand_over(turn, nodes, thief, part);
-        match self.victim(turn.now, from) {
+        match self.victim(turn.now, nodes, from) {
             Some(victim) => victims[at] = victim,
             None => _ = victims.swap_remove(at),
         }
@@ -85,24 +85,24 @@ impl Job {
     }
 
     /// The hardest part that the thief would finish before the victim finishes all.
-    fn loot(&self, now: Duration, thief: NodeId, victim: &Victim) -> Option<PartId> {
-        let (member, from) = (self.members.get(&thief)?, self.members.get(&victim.id)?);
-        let idle = member.held.len() < member.lanes();
-        let delay = if idle { 0.0 } else { self.held_cost(now, member) / (member.lane_speed() * member.lanes().max(1) as f64) };
+    fn loot(&self, now: Duration, nodes: &Nodes, thief: NodeId, victim: &Victim) -> Option<PartId> {
+        let (member, from, node) = (self.members.get(&thief)?, self.members.get(&victim.id)?, nodes.get(&thief)?);
+        let idle = node.free_lanes() > 0;
+        let delay = if idle { 0.0 } else { self.held_cost(now, nodes, thief) / (member.lane_speed() * node.lanes().max(1) as f64) };
         let pays = |part: &PartId| {
             let state = self.part(*part);
             delay + state.expected / member.lane_speed() < victim.finish
                 && !state.failed_on(thief)
-                && (!state.suspect || member.held.is_empty())
+                && (!state.suspect || node.held.is_empty())
         };
         let queued = from.queue.iter().copied().find(pays);
-        queued.or_else(|| idle.then(|| self.not_begun(from)).flatten().map(|(_, lease)| lease.part).filter(pays))
+        queued.or_else(|| idle.then(|| self.not_begun(nodes, victim.id)).flatten().map(|(_, lease)| lease.part).filter(pays))
     }
 
-    fn take_away(&mut self, turn: &mut Turn, nodes: &Nodes, from: NodeId, part: PartId) {
+    fn take_away(&mut self, turn: &mut Turn, nodes: &mut Nodes, from: NodeId, part: PartId) {
         if let Place::Leased(lease) = self.part(part).place {
             self.call_back(turn, nodes, lease);
-            self.close(turn, lease, AttemptOutcome::Cancelled, "another node was free");
+            self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "another node was free");
         }
         if let Some(member) = self.members.get_mut(&from) {
             member.queue.retain(|queued| *queued != part);
@@ -110,23 +110,24 @@ impl Job {
     }
 
     /// The last attempt that a node holds, if no lane can have begun it.
-    fn not_begun(&self, member: &Member) -> Option<(LeaseId, &Lease)> {
-        let last = member.held.last().filter(|_| member.held.len() > member.lanes())?;
-        self.leases.get(last).filter(|lease| lease.begun.is_none() && lease.role == Role::Main).map(|lease| (*last, lease))
+    fn not_begun(&self, nodes: &Nodes, id: NodeId) -> Option<(LeaseId, &Lease)> {
+        let last = nodes.get(&id)?.held_of(self.id).next_back()?;
+        self.leases.get(&last).filter(|lease| lease.begun.is_none() && lease.role == Role::Main).map(|lease| (last, lease))
     }
 
     /// A node as a victim, if there is something to take.
-    fn victim(&self, now: Duration, id: NodeId) -> Option<Victim> {
-        let member = self.members.get(&id)?;
-        let last = member.queue.back().copied().or_else(|| self.not_begun(member).map(|(_, lease)| lease.part))?;
-        let cost = self.held_cost(now, member) + member.queue.iter().map(|part| self.part(*part).expected).sum::<f64>();
+    fn victim(&self, now: Duration, nodes: &Nodes, id: NodeId) -> Option<Victim> {
+        let (member, node) = (self.members.get(&id)?, nodes.get(&id)?);
+        let last = member.queue.back().copied().or_else(|| self.not_begun(nodes, id).map(|(_, lease)| lease.part))?;
+        let cost = self.held_cost(now, nodes, id) + member.queue.iter().map(|part| self.part(*part).expected).sum::<f64>();
         let (last, speed) = (self.part(last).expected, member.lane_speed());
-        Some(Victim { id, finish: (cost - last).max(0.0) / (speed * member.lanes().max(1) as f64) + last / speed })
+        Some(Victim { id, finish: (cost - last).max(0.0) / (speed * node.lanes().max(1) as f64) + last / speed })
     }
 
     /// Cost that is left of what a node holds.
-    fn held_cost(&self, now: Duration, member: &Member) -> f64 {
-        member.held.iter().filter_map(|lease| self.leases.get(lease)).map(|lease| self.left_of(now, member, lease)).sum()
+    fn held_cost(&self, now: Duration, nodes: &Nodes, id: NodeId) -> f64 {
+        let Some(member) = self.members.get(&id) else { return 0.0 };
+        self.held_by(nodes, id).map(|lease| self.left_of(now, member, lease)).sum()
     }
 
     /// Cost that is left of an attempt, as far as that can be told.

@@ -9,7 +9,7 @@ use tessera_engine::part::Rect;
 
 use super::LeaseId;
 use super::job::Job;
-use super::node::Nodes;
+use super::node::{Node, Nodes};
 use super::part::{Lease, PartState, Place, Role};
 use super::turn::Turn;
 use crate::limits::{PARTS_PER_JOB, PIECE_EDGE, PIECE_SECONDS, PIECES, STEAL_INTERVAL};
@@ -30,11 +30,11 @@ struct Straggler {
 
 impl Job {
     /// Lets idle lanes help with what others still render.
-    pub(super) fn shorten_tail(&mut self, turn: &mut Turn, nodes: &Nodes, ids: &[NodeId]) {
+    pub(super) fn shorten_tail(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
         if !self.loose.is_empty() || self.question.is_some() {
             return;
         }
-        let idle = self.idle(nodes, ids);
+        let idle = self.idle(turn, nodes, ids);
         if idle.is_empty() {
             return;
         }
@@ -43,7 +43,7 @@ impl Job {
             self.reconsider = Some(turn.now + STEAL_INTERVAL);
         }
         if let Some(last) = stragglers.first().filter(|last| self.pays_to_cut(nodes, &idle, last)) {
-            let pieces = self.free_lanes(&idle) + 1;
+            let pieces = free_lanes(nodes, &idle) + 1;
             return self.cut(turn, nodes, last.part, pieces);
         }
         for id in idle {
@@ -75,17 +75,12 @@ impl Job {
         part.expected / member.lane_speed() < straggler.left * GAIN && !part.failed_on(id) && !part.suspect
     }
 
-    fn free_lanes(&self, idle: &[NodeId]) -> usize {
-        idle.iter().filter_map(|id| self.members.get(id)).map(|member| member.lanes() - member.held.len()).sum()
-    }
-
     fn pays_to_cut(&self, nodes: &Nodes, idle: &[NodeId], straggler: &Straggler) -> bool {
         let part = self.part(straggler.part);
         if part.suspect {
             return false;
         }
-        let speed =
-            |id: &NodeId| self.members.get(id).map_or(0.0, |member| member.lane_speed() * (member.lanes() - member.held.len()) as f64);
+        let speed = |id: &NodeId| self.members.get(id).map_or(0.0, |member| member.lane_speed() * free_lanes(nodes, &[*id]) as f64);
         let holder = self.leases.get(&straggler.lease).map(|lease| lease.node).filter(|id| self.usable(nodes, *id));
         let speeds: f64 =
             idle.iter().map(speed).sum::<f64>() + holder.and_then(|id| self.members.get(&id)).map_or(0.0, |member| member.lane_speed());
@@ -99,12 +94,12 @@ impl Job {
     }
 
     /// Calls a part back and gives it out in pieces.
-    fn cut(&mut self, turn: &mut Turn, nodes: &Nodes, part: PartId, pieces: usize) {
+    fn cut(&mut self, turn: &mut Turn, nodes: &mut Nodes, part: PartId, pieces: usize) {
         self.cancel_attempts(turn, nodes, part, "its part was cut up for idle lanes");
         self.replace(turn, part, &cut_up(self.part(part).rect, pieces.min(PIECES), PIECE_EDGE), "for idle lanes");
         // There is no time to ask a job's own policy, and little to decide.
         let (parts, powers) = (self.hardest_first(), self.usable_powers(nodes));
-        let plan = assign::earliest_finish(&parts, &powers, &self.backlog());
+        let plan = assign::earliest_finish(&parts, &powers, &self.backlog(nodes));
         self.take_redistribution(turn, nodes, &parts, &plan);
         let ids: Vec<NodeId> = self.members.keys().copied().collect();
         ids.iter().for_each(|id| self.fill(turn, nodes, *id));
@@ -135,6 +130,10 @@ impl Job {
         self.log.event(turn.now, EventKind::Cut, None, vec![part], format!("into {} parts {why}", ids.len()));
         true
     }
+}
+
+fn free_lanes(nodes: &Nodes, ids: &[NodeId]) -> usize {
+    ids.iter().filter_map(|id| nodes.get(id)).map(Node::free_lanes).sum()
 }
 
 /// A rectangle in about so many pieces, as square as they come, with no edge below `least` where it can be helped.

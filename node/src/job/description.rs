@@ -24,6 +24,10 @@ pub struct JobDescription {
     pub assign: Assign,
     /// Share of the parts that two nodes render, to compare their pixels: 0 to 1.
     pub audit: f64,
+    /// Failures of a part, on different nodes where there are such, after which it is cut up or left out: 1 or more.
+    pub attempts: u32,
+    /// Seconds that it waits for a node when there is none; `None` for the farm's own patience.
+    pub patience: Option<f64>,
     /// What is written.
     pub output: Output,
     /// The script itself, where a policy is one of its functions.
@@ -32,6 +36,33 @@ pub struct JobDescription {
     pub parameters: BTreeMap<String, String>,
     /// What the user should know: of files, what is not modelled.
     pub warnings: Vec<String>,
+}
+
+/// Frames of a sequence, each a job of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// Number of the first frame.
+    pub first: u32,
+    /// No frame has a higher number.
+    pub last: u32,
+    /// Distance of the numbers.
+    pub step: u32,
+    /// Whether each frame waits until the one before it is finished.
+    pub in_order: bool,
+}
+
+impl Frames {
+    /// The frames' numbers.
+    pub fn numbers(&self) -> impl Iterator<Item = u32> + use<> {
+        (self.first..=self.last).step_by(self.step as usize)
+    }
+}
+
+impl std::fmt::Display for Frames {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} to {}", self.first, self.last)?;
+        if self.step > 1 { write!(f, " in steps of {}", self.step) } else { Ok(()) }
+    }
 }
 
 /// The files of a job: plain names, without a path.

@@ -6,7 +6,7 @@ use glam::DAffine3;
 use mlua::{Function, Lua, MetaMethod, UserData, UserDataMethods, Value};
 use tessera_engine::description::{Camera, Film, Light, Material, Matrix, Model, Quality, Render, Rgb, Shape, SourceId, Texture};
 
-use super::{Output, api::transform, keys::describe, place::Place};
+use super::{Frames, Output, api::transform, keys::describe, place::Place};
 use crate::schedule::{Assign, Probe, Split};
 
 /// An object as a script holds it.
@@ -80,6 +80,10 @@ pub struct JobNode {
     pub output: Output,
     pub seed: u64,
     pub audit: f64,
+    pub attempts: u32,
+    pub patience: Option<f64>,
+    /// Which frame of how many it is, where there are several.
+    pub frames: Option<(u32, Frames)>,
 }
 
 /// A built-in policy, or the script's own function.

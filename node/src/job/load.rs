@@ -11,7 +11,7 @@ use tessera_engine::{
 };
 
 use super::{
-    JobDescription, ScriptBundle, assemble,
+    FRAME_PARAMETER, Frames, JobDescription, ScriptBundle, assemble,
     compile::{self, Compiled},
     context::{Context, Files, read_bounded},
     evaluate::{self, Evaluated, evaluate},
@@ -34,6 +34,15 @@ pub struct LoadedJob {
     pub assets: MemoryAssets,
     /// Where each object was made.
     pub sources: Sources,
+    /// Which frame it is, where the script says several.
+    pub frames: Option<(u32, Frames)>,
+}
+
+impl LoadedJob {
+    /// The sequence that the script says, unless one frame of it was chosen.
+    pub fn sequence(&self, parameters: &BTreeMap<String, String>) -> Option<Frames> {
+        self.frames.map(|(_, frames)| frames).filter(|_| !parameters.contains_key(FRAME_PARAMETER))
+    }
 }
 
 /// Runs the job script at `path` with values given with `--set`, and compiles its scene, so that what is wrong with a file shows at once.
@@ -68,19 +77,21 @@ fn describe(
     let (split, assign) = (built_in(&job.split, Split::Script), built_in(&job.assign, Assign::Script));
     let asks_script = matches!(job.split, Policy::Script(_)) || matches!(job.assign, Policy::Script(_));
     let description = JobDescription {
-        name: evaluate::job_name(&name),
+        name: job.frames.map_or_else(|| evaluate::job_name(&name), |(frame, _)| format!("{}.{frame:04}", evaluate::job_name(&name))),
         frame,
         assets: needed.into_iter().collect(),
         probe: job.probe.clone(),
         split,
         assign,
         audit: job.audit,
+        attempts: job.attempts,
+        patience: job.patience,
         output: job.output.clone(),
         script: asks_script.then(|| ScriptBundle { name, source, modules: context.modules.into_loaded() }),
         parameters: parameters.clone(),
         warnings,
     };
-    Ok((LoadedJob { description, assets, sources: context.sources }, scene))
+    Ok((LoadedJob { description, assets, sources: context.sources, frames: job.frames }, scene))
 }
 
 fn built_in<T: Clone>(policy: &Policy<T>, script: T) -> T {

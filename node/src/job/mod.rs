@@ -19,7 +19,8 @@ mod place;
 mod policy;
 mod sandbox;
 
-pub use description::{JobDescription, Output, PixelType, ScriptBundle};
+pub use api::FRAME_PARAMETER;
+pub use description::{Frames, JobDescription, Output, PixelType, ScriptBundle};
 pub use load::{LoadedJob, load};
 pub use policy::Policies;
 

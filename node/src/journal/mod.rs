@@ -4,10 +4,9 @@
 //! the disk.
 //!
 //! Events stand in a database (redb) in the order in which the farm took them; a replay through the same `step` reaches the same state and reads no
-//! pixels. Pixels stand in segments, append-only files of checksummed records; a torn tail is cut off when a segment is opened.
+//! pixels. A long journal is shortened: a snapshot of the farm takes the place of all events before it. Pixels stand in segments, append-only files of checksummed records; a torn tail is cut off when a segment is opened.
 
 mod filter;
-mod renew;
 mod segment;
 
 use std::collections::BTreeMap;
@@ -15,19 +14,24 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use redb::{Database, ReadableDatabase, ReadableTable, TableDefinition};
+use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, TableDefinition};
 
 pub use filter::Filter;
-pub use renew::renewed;
 use segment::Segment;
 
 use crate::error::{Error, ExitCode, Result};
 use crate::farm::{Event, Farm, FarmConfig, JobId, LeaseId};
-use crate::limits::JOURNAL_EVENTS;
+use crate::limits::{JOURNAL_COMPACTED_BYTES, JOURNAL_EVENTS};
 use crate::schedule::PartId;
 
 /// Number of an event to the farm's clock in nanoseconds and the event in postcard coding.
 const EVENTS: TableDefinition<u64, (u64, &[u8])> = TableDefinition::new("events");
+
+/// The [`FORMAT`] of what was written, and with it the farm before the first event, in postcard coding (nothing for a farm without a past).
+const BEGINNING: TableDefinition<u32, &[u8]> = TableDefinition::new("beginning");
+
+/// Changes with every change of what an event or a snapshot holds.
+const FORMAT: u32 = 2;
 
 /// The journal of one coordinator, in a folder of its own.
 pub struct Journal {
@@ -54,7 +58,7 @@ impl Journal {
     /// # Errors
     /// When files cannot be read or written, or when another process holds the journal.
     ///
-    /// A long journal of jobs that are all over is begun anew: what came of them is in their manifests.
+    /// A long journal is shortened.
     pub fn open(folder: &Path, config: FarmConfig) -> Result<(Self, Recovered)> {
         std::fs::create_dir_all(folder).map_err(|error| failed(folder, "make the folder", &error))?;
         let path = folder.join("events.redb");
@@ -65,12 +69,14 @@ impl Journal {
         })?;
         let mut journal =
             Self { database: Some(database), next: 0, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
-        let mut farm = Farm::new(config.clone());
-        let events = journal.replay(|at, event| _ = farm.step(at, event)).map_err(|error| failed(&path, "read the journal", &*error))?;
+        let read = journal.replay(config).map_err(|error| failed(&path, "read the journal", &*error))?;
+        let Some((farm, events)) = read else {
+            return Err(failed(&path, "read the journal", "another version of tessera wrote it")
+                .with_help("let that version end its jobs, then move the folder `journal` away; finished jobs stay where they are"));
+        };
         journal.next = events;
-        if events > JOURNAL_EVENTS && farm.jobs().iter().all(|job| job.outcome.is_some()) {
-            journal.clear().map_err(|error| failed(&path, "shorten the journal", &*error))?;
-            farm = Farm::new(config);
+        if events > JOURNAL_EVENTS {
+            journal.renew(&farm)?;
         }
         let open: Vec<JobId> = farm.jobs().iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
         journal.drop_pixels_but_of(&open)?;
@@ -78,21 +84,32 @@ impl Journal {
         Ok((journal, Recovered { farm, events }))
     }
 
-    fn replay(&mut self, mut take: impl FnMut(Duration, Event)) -> Result<u64, Box<dyn std::error::Error + Send + Sync>> {
+    /// The farm as events, and a snapshot before them, tell; and how many events. `None` if they are of another format.
+    fn replay(&mut self, config: FarmConfig) -> Result<Option<(Farm, u64)>, Box<dyn std::error::Error + Send + Sync>> {
         let reading = self.database()?.begin_read()?;
         let table = match reading.open_table(EVENTS) {
             Ok(table) => table,
-            Err(redb::TableError::TableDoesNotExist(_)) => return Ok(0),
+            Err(redb::TableError::TableDoesNotExist(_)) => return Ok(Some((Farm::new(config), 0))),
             Err(error) => return Err(error.into()),
+        };
+        let beginning = match reading.open_table(BEGINNING) {
+            Ok(beginning) => beginning.get(FORMAT)?,
+            Err(redb::TableError::TableDoesNotExist(_)) => None,
+            Err(error) => return Err(error.into()),
+        };
+        let Some(beginning) = beginning else { return Ok(None) };
+        let mut farm = match beginning.value() {
+            [] => Farm::new(config),
+            coded => postcard::from_bytes::<Farm>(coded)?.resumed(config),
         };
         let mut count = 0;
         for entry in table.iter()? {
             let (number, value) = entry?;
             let (at, coded) = value.value();
-            take(Duration::from_nanos(at), postcard::from_bytes(coded)?);
+            farm.step(Duration::from_nanos(at), postcard::from_bytes(coded)?);
             count = number.value() + 1;
         }
-        Ok(count)
+        Ok(Some((farm, count)))
     }
 
     /// Appends what [`Filter::admit`] says of events, in order. It is durable after the next [`Self::sync`].
@@ -114,7 +131,7 @@ impl Journal {
             return Ok(());
         }
         let pending = std::mem::take(&mut self.pending);
-        if let Err(error) = self.write(self.next, &pending, false) {
+        if let Err(error) = self.write(self.next, &pending, None) {
             self.pending = pending;
             return Err(failed(&self.folder, "write the journal", &*error));
         }
@@ -137,18 +154,22 @@ impl Journal {
         (self.next, bytes)
     }
 
-    /// Puts these events, made by [`renewed`], in place of all that were appended: at once or not at all.
+    /// Puts a snapshot of the farm, as it was after all events that were appended, in their place: at once or not at all.
     ///
     /// # Errors
     /// When the disk is full or fails; nothing is lost by trying again.
-    pub fn renew(&mut self, entries: &[(Duration, Event)]) -> Result<()> {
+    pub fn renew(&mut self, farm: &Farm) -> Result<()> {
         self.sync()?;
         let path = self.folder.join("events.redb");
-        let replaced = self.write(0, entries, true);
+        let coded = postcard::to_stdvec(farm).map_err(|error| failed(&path, "shorten the journal", &error))?;
+        let replaced = self.write(0, &[], Some(&coded));
         replaced.map_err(|error| failed(&path, "shorten the journal", &*error))?;
-        self.next = entries.len() as u64;
+        self.next = 0;
+        tracing::info!(bytes = coded.len(), "the journal begins with a snapshot of the farm");
         // The room is taken again by later events where it cannot be given back now.
-        if let Err(error) = self.compact() {
+        if self.size().1 > JOURNAL_COMPACTED_BYTES
+            && let Err(error) = self.compact()
+        {
             tracing::warn!(%error, "the journal keeps its length on disk");
         }
         Ok(())
@@ -168,14 +189,6 @@ impl Journal {
         Ok(())
     }
 
-    /// Begins anew: nothing in the journal is needed any more.
-    fn clear(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
-        self.write(0, &[], true)?;
-        self.compact()?;
-        self.next = 0;
-        Ok(())
-    }
-
     fn compact(&mut self) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let done = self.database()?.compact();
         if done.is_err() {
@@ -186,8 +199,13 @@ impl Journal {
     }
 
     /// Writes entries from the number `first` on, whole or not at all. Writing them again changes nothing: where the disk failed late, they may be there.
-    fn write(&mut self, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
-        let written = put(self.database()?, first, entries, anew);
+    fn write(
+        &mut self,
+        first: u64,
+        entries: &[(Duration, Event)],
+        snapshot: Option<&[u8]>,
+    ) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+        let written = put(self.database()?, first, entries, snapshot);
         if written.is_err() {
             self.database = None;
         }
@@ -258,12 +276,21 @@ impl Journal {
     }
 }
 
-fn put(database: &Database, first: u64, entries: &[(Duration, Event)], anew: bool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+fn put(
+    database: &Database,
+    first: u64,
+    entries: &[(Duration, Event)],
+    snapshot: Option<&[u8]>,
+) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let writing = database.begin_write()?;
-    if anew {
+    if snapshot.is_some() {
         writing.delete_table(EVENTS)?;
     }
     {
+        let mut beginning = writing.open_table(BEGINNING)?;
+        if snapshot.is_some() || beginning.is_empty()? {
+            beginning.insert(FORMAT, snapshot.unwrap_or_default())?;
+        }
         let mut table = writing.open_table(EVENTS)?;
         for (number, (at, event)) in (first..).zip(entries) {
             table.insert(number, (u64::try_from(at.as_nanos())?, postcard::to_stdvec(event)?.as_slice()))?;

@@ -1,6 +1,8 @@
 use super::*;
-use crate::farm::{Command, Incarnation, JobSpec, NodeInfo, NodeState, ToNode};
+use crate::farm::{Build, Command, Incarnation, JobSpec, NodeInfo, ToNode};
 use crate::schedule::{Assign, CostMap, NodeId, Probe, Split};
+
+const BUILD: Build = Build { revision: 1, canary: [7; 32] };
 
 fn spec() -> JobSpec {
     let costs = CostMap { cell: 64, columns: 1, rows: 1, seconds_per_pixel: vec![1.0] };
@@ -14,6 +16,11 @@ fn spec() -> JobSpec {
         assign: Assign::EarliestFinish,
         min_nodes: 1,
         audit: 0.0,
+        owner: "someone".into(),
+        priority: 0,
+        after: Vec::new(),
+        attempts: 3,
+        patience: None,
     }
 }
 
@@ -22,10 +29,11 @@ fn life() -> Vec<(Duration, Event)> {
     let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(1));
     let info = NodeInfo { name: "n".into(), lanes: 2, build: "b".into(), address: "a".into() };
     let mut events = vec![
+        Event::Restarted { build: BUILD },
         Event::JobSubmitted { job, spec: spec() },
         Event::NodeJoined { node, incarnation, info },
         Event::NodeHeard { node, incarnation },
-        Event::NodeProved { node, incarnation, verdict: Ok(()) },
+        Event::NodeProved { node, incarnation, canary: BUILD.canary },
         Event::Tick,
         Event::Prepared { node, incarnation, job, result: Ok(()) },
     ];
@@ -156,11 +164,11 @@ fn pixels_on_disk_are_not_rendered_again_after_a_crash_before_their_commit() {
     let mut kept = farm.clone();
     kept.step(Duration::from_secs(2), Event::Committed { job: JobId(1), lease: LeaseId(1) });
     let orders = |farm: &mut Farm| -> usize {
-        farm.step(Duration::from_secs(2), Event::Restarted);
+        farm.step(Duration::from_secs(2), Event::Restarted { build: BUILD });
         let (node, incarnation) = (NodeId(0), Incarnation(8));
         let info = NodeInfo { name: "n".into(), lanes: 16, build: "b".into(), address: "a".into() };
         let mut commands = farm.step(Duration::from_secs(2), Event::NodeJoined { node, incarnation, info });
-        commands.extend(farm.step(Duration::from_secs(2), Event::NodeProved { node, incarnation, verdict: Ok(()) }));
+        commands.extend(farm.step(Duration::from_secs(2), Event::NodeProved { node, incarnation, canary: BUILD.canary }));
         commands.extend(farm.step(Duration::from_secs(2), Event::Prepared { node, incarnation, job: JobId(1), result: Ok(()) }));
         farm.check_invariants().unwrap();
         commands.iter().filter(|command| matches!(command, Command::Send { message: ToNode::Render { .. }, .. })).count()
@@ -184,34 +192,48 @@ fn a_renewed_journal_goes_on_as_the_farm_does() {
     for (_, event) in life {
         takes(&mut journal, &mut farm, 5, event);
     }
-    assert!(renewed(&farm, FarmConfig::default()).is_none(), "a job runs");
-    takes(&mut journal, &mut farm, 6, Event::JobCancelled { job: JobId(1), reason: "enough".into() });
-    let left = |node: u32| Event::NodeLeft { node: NodeId(node), incarnation: Incarnation(9), reason: "bye".into() };
+    journal.sync().unwrap();
+    let before = journal.size().0;
+    journal.renew(&farm).unwrap();
+    assert!(before > 10 && journal.size().0 == 0);
+
+    // Everything goes on: the job that runs, a node that comes, the end of a journal that is opened in the middle of it.
+    let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(1));
+    let open = |farm: &Farm, job| farm.record(job).unwrap().parts.iter().flat_map(|part| part.attempts.clone()).find(|it| it.end.is_none());
+    for at in 6..10 {
+        let lease = LeaseId(open(&farm, job).unwrap().lease);
+        takes(&mut journal, &mut farm, at, Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
+        takes(&mut journal, &mut farm, at, Event::Committed { job, lease });
+    }
     let info = NodeInfo { name: "second".into(), lanes: 1, build: "b".into(), address: "a".into() };
-    takes(&mut journal, &mut farm, 6, Event::NodeJoined { node: NodeId(1), incarnation: Incarnation(9), info });
-    assert!(renewed(&farm, FarmConfig::default()).is_none(), "a node has not proved itself yet");
-    takes(&mut journal, &mut farm, 6, left(1));
+    takes(&mut journal, &mut farm, 10, Event::NodeJoined { node: NodeId(1), incarnation: Incarnation(9), info });
     journal.sync().unwrap();
-    let before = journal.size();
-
-    let (mut farm, entries) = renewed(&farm, FarmConfig::default()).unwrap();
-    journal.renew(&entries).unwrap();
-    assert!(journal.size().0 < before.0);
-    assert_eq!(farm.nodes().iter().map(|node| node.state).collect::<Vec<_>>(), [NodeState::Ready, NodeState::Lost]);
-
-    // The ready node goes on in the same life: it renders the next job without joining again.
-    let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(2));
-    takes(&mut journal, &mut farm, 7, Event::JobSubmitted { job, spec: spec() });
-    takes(&mut journal, &mut farm, 8, Event::Prepared { node, incarnation, job, result: Ok(()) });
-    let lease =
-        farm.record(job).unwrap().parts.iter().find_map(|part| part.attempts.first().map(|attempt| LeaseId(attempt.lease))).unwrap();
-    takes(&mut journal, &mut farm, 9, Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
-    takes(&mut journal, &mut farm, 9, Event::Committed { job, lease });
-    assert_eq!(farm.jobs()[0].committed, 1);
-    journal.sync().unwrap();
+    assert_eq!(farm.jobs()[0].committed, 8);
+    drop(journal);
+    let (mut journal, recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    assert_eq!(farm.difference(&recovered.farm), None);
+    assert!(recovered.events < 15, "{}", recovered.events);
+    // And once more, with nothing after it.
+    journal.renew(&farm).unwrap();
     drop(journal);
     let (_, recovered) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
-    assert_eq!(farm.difference(&recovered.farm), None);
+    assert_eq!((farm.difference(&recovered.farm), recovered.events), (None, 0));
+}
+
+/// What another version wrote is neither misread nor touched.
+#[test]
+fn a_journal_of_another_version_is_refused_with_a_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut journal, _) = Journal::open(folder.path(), FarmConfig::default()).unwrap();
+    journal.append(life());
+    journal.sync().unwrap();
+    let writing = journal.database().unwrap().begin_write().unwrap();
+    writing.delete_table(BEGINNING).unwrap();
+    writing.open_table(BEGINNING).unwrap().insert(FORMAT + 1, &[][..]).unwrap();
+    writing.commit().unwrap();
+    drop(journal);
+    let error = Journal::open(folder.path(), FarmConfig::default()).err().unwrap().to_string();
+    assert!(error.contains("another version of tessera wrote it") && error.contains("move the folder `journal` away"), "{error}");
 }
 
 #[test]

@@ -263,6 +263,14 @@ pub enum EventKind {
     Revoked,
     /// Parts that were to be rendered twice were not.
     AuditSkipped,
+    /// Somebody wanted the job to wait.
+    Paused,
+    /// It went on.
+    Resumed,
+    /// A node was about to go: it finished what its lanes rendered.
+    Draining,
+    /// No node of the build on which the job began was left: it began anew on another.
+    BegunAnew,
 }
 
 /// What came of it, in the paper's terms.

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
 use super::NodeId;
@@ -11,7 +12,7 @@ use crate::limits::{PROBE_CELLS, PROBE_PATCH_PER_AXIS};
 const POINTS_PER_EDGE: u32 = 4;
 
 /// Geometry of a probe: square cells over the frame, each with a lattice of sample pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Cells {
     /// Distance of the lattice's pixels, at least 1. In each cell the lattice begins at the cell's upper left pixel.
     pub stride: u32,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::thread;
 
 use super::{Fault, Run, Scenario, World};
-use crate::farm::Outcome;
+use crate::farm::{JobId, Outcome};
 use crate::manifest::AttemptOutcome;
 
 /// What came of many schedules.
@@ -60,14 +60,28 @@ impl Campaign {
 
 /// The promise that a run broke, if it broke one: besides what the judge saw, a job must end as its schedule lets it.
 pub fn broken_by(scenario: &Scenario, run: &Run) -> Option<String> {
-    let cancelled = scenario.faults.iter().any(|(_, fault)| *fault == Fault::Cancel);
-    match &run.outcome {
-        _ if !run.violations.is_empty() => Some(run.violations.join("; ")),
+    if !run.violations.is_empty() {
+        return Some(run.violations.join("; "));
+    }
+    let others = run.others.iter().map(|(job, outcome)| (*job, Some(outcome)));
+    let ends = std::iter::once((JobId(1), run.outcome.as_ref())).chain(others);
+    ends.filter_map(|(job, outcome)| broken_end(scenario, job, outcome)).next()
+}
+
+fn broken_end(scenario: &Scenario, job: JobId, outcome: Option<&Outcome>) -> Option<String> {
+    let cancelled = scenario.faults.iter().any(|(_, fault)| *fault == Fault::Cancel(job));
+    let awaits = |reason: &str| reason.contains("which it waits for");
+    match outcome {
         Some(Outcome::Finished) => None,
         Some(Outcome::Incomplete { holes: 1 }) if scenario.poison.is_some() => None,
         Some(Outcome::Cancelled { .. }) if cancelled => None,
-        outcome => Some(format!("{outcome:?}")),
+        Some(Outcome::Failed { reason }) if awaits(reason) && (scenario.poison.is_some() || has_cancel(scenario)) => None,
+        outcome => Some(format!("job {}: {outcome:?}", job.0)),
     }
+}
+
+fn has_cancel(scenario: &Scenario) -> bool {
+    scenario.faults.iter().any(|(_, fault)| matches!(fault, Fault::Cancel(_)))
 }
 
 /// The scenario without the faults that what it breaks does not need.

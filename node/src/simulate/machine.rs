@@ -7,7 +7,7 @@ use tessera_engine::part::Rect;
 
 use super::random::Random;
 use super::{Machine, Scenario};
-use crate::farm::{Event, Incarnation, JobId, LeaseId, NodeInfo, ToNode};
+use crate::farm::{Build, Event, Incarnation, JobId, LeaseId, NodeInfo, ToNode};
 use crate::schedule::NodeId;
 
 /// A part that a machine holds.
@@ -31,6 +31,8 @@ pub(super) struct Node {
     pub hangs_next: bool,
     /// Whether its pixels are wrong.
     pub corrupt: bool,
+    /// The build that its process is of.
+    pub build: u32,
     /// Until when the process stands still, and until when nothing passes to it and from it.
     pub paused: Duration,
     pub deaf: Duration,
@@ -41,7 +43,7 @@ pub(super) struct Node {
     /// Attempts of lanes that hang.
     hanging: BTreeSet<LeaseId>,
     waiting: VecDeque<Task>,
-    delivered: BTreeMap<LeaseId, Event>,
+    delivered: BTreeMap<LeaseId, (JobId, Event)>,
     prepared: BTreeSet<JobId>,
 }
 
@@ -64,6 +66,7 @@ impl Node {
             fails_next: false,
             hangs_next: false,
             corrupt: false,
+            build: 0,
             paused: Duration::ZERO,
             deaf: Duration::ZERO,
             mute: Duration::ZERO,
@@ -81,8 +84,9 @@ impl Node {
     }
 
     /// A new process begins.
-    pub fn start(&mut self) {
+    pub fn start(&mut self, build: u32) {
         self.end();
+        self.build = build;
         (self.alive, self.life) = (true, self.life + 1);
         (self.paused, self.deaf, self.mute) = (Duration::ZERO, Duration::ZERO, Duration::ZERO);
     }
@@ -107,7 +111,7 @@ impl Node {
     pub fn receive(&mut self, message: ToNode, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
         let (node, incarnation) = (self.id, self.incarnation());
         match message {
-            ToNode::Prove => vec![Act::Say(0.01, Event::NodeProved { node, incarnation, verdict: Ok(()) })],
+            ToNode::Prove => vec![Act::Say(0.01, Event::NodeProved { node, incarnation, canary: canary(self.build).canary })],
             ToNode::Prepare { job } => {
                 let result = if self.machine.incapable { Err("no room for the scene".into()) } else { Ok(()) };
                 self.prepared.insert(job);
@@ -126,10 +130,17 @@ impl Node {
             }
             ToNode::Release { job } => {
                 self.prepared.remove(&job);
+                self.delivered.retain(|_, (of, _)| *of != job);
+                let mut stopped: Vec<LeaseId> = self.waiting.iter().filter(|task| task.job == job).map(|task| task.lease).collect();
+                stopped.extend(
+                    self.running.values().filter(|task| task.job == job && !self.hanging.contains(&task.lease)).map(|task| task.lease),
+                );
                 self.waiting.retain(|task| task.job != job);
-                self.running.retain(|_, task| task.job != job);
-                self.delivered.clear();
-                Vec::new()
+                self.running.retain(|lease, _| !stopped.contains(lease));
+                let mut acts: Vec<Act> =
+                    stopped.into_iter().map(|lease| Act::Say(0.0, Event::Stopped { node, incarnation, job, lease })).collect();
+                acts.extend(self.begin(scenario, random));
+                acts
             }
         }
     }
@@ -149,7 +160,7 @@ impl Node {
 
     /// Takes an order; one that it has already, or has carried out, is the same order again.
     fn render(&mut self, task: Task, scenario: &Scenario, random: &mut Random) -> Vec<Act> {
-        if let Some(event) = self.delivered.get(&task.lease) {
+        if let Some((_, event)) = self.delivered.get(&task.lease) {
             return vec![Act::Say(0.0, event.clone())];
         }
         if !self.running.contains_key(&task.lease) && !self.waiting.contains(&task) {
@@ -184,10 +195,10 @@ impl Node {
         let event = if poisoned || std::mem::take(&mut self.fails_next) {
             Event::RenderFailed { node, incarnation, job, lease, reason: "the lane panicked".into() }
         } else {
-            let hash = true_hash(rect).map(|byte| if self.corrupt { byte ^ (1 + self.id.0 as u8) } else { byte });
+            let hash = true_hash(job, self.build, rect).map(|byte| if self.corrupt { byte ^ (1 + self.id.0 as u8) } else { byte });
             Event::Rendered { node, incarnation, job, lease, hash, seconds }
         };
-        self.delivered.insert(lease, event.clone());
+        self.delivered.insert(lease, (job, event.clone()));
         let mut acts = vec![Act::Say(0.0, event)];
         acts.extend(self.begin(scenario, random));
         acts
@@ -199,7 +210,12 @@ impl Node {
     }
 }
 
-/// The hash of a part's right pixels.
-pub(super) fn true_hash(rect: Rect) -> [u8; 32] {
-    *blake3::hash(format!("{rect:?}").as_bytes()).as_bytes()
+/// The hash of a part's right pixels, rendered with a build.
+pub(super) fn true_hash(job: JobId, build: u32, rect: Rect) -> [u8; 32] {
+    *blake3::hash(format!("{} {build} {rect:?}", job.0).as_bytes()).as_bytes()
+}
+
+/// What a build is known by.
+pub(super) fn canary(build: u32) -> Build {
+    Build { revision: build, canary: [build as u8; 32] }
 }

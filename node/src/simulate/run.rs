@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::farm::{JobRecord, Outcome};
+use crate::farm::{JobId, JobRecord, Outcome};
 use crate::manifest::{AttemptOutcome, EventKind};
 use crate::schedule::NodeId;
 
@@ -12,6 +12,8 @@ use crate::schedule::NodeId;
 pub struct Run {
     /// How the job ended; `None` if it had not at the horizon.
     pub outcome: Option<Outcome>,
+    /// How other jobs ended.
+    pub others: BTreeMap<JobId, Outcome>,
     /// What the farm tells of it.
     pub record: JobRecord,
     /// Promises that were broken. Empty, or there is a bug.

@@ -5,7 +5,8 @@ use std::time::Duration;
 use tessera_engine::part::Rect;
 
 use super::random::{Random, mix};
-use crate::farm::{FarmConfig, JobSpec};
+use crate::farm::{FarmConfig, JobId, JobSpec};
+use crate::limits::ATTEMPTS_PER_PART;
 use crate::schedule::{Assign, Probe, Split};
 
 /// A machine that runs a node.
@@ -65,8 +66,18 @@ pub enum Fault {
     FailPart(usize),
     /// The coordinator is killed and started anew: what is not on disk is gone, connections are made anew.
     RestartCoordinator,
-    /// A user cancels the job.
-    Cancel,
+    /// A user cancels a job.
+    Cancel(JobId),
+    /// A user lets a job wait.
+    PauseJob(JobId),
+    /// It goes on.
+    ResumeJob(JobId),
+    /// A user gives a job another rank.
+    Rank(JobId, i32),
+    /// The node is told to end: it finishes what its lanes render, for so long at the most, and goes.
+    Drain(usize, Duration),
+    /// The coordinator is started anew as another build, and so is every node that starts from now on.
+    Upgrade,
 }
 
 /// A place of the frame that no node can render.
@@ -112,8 +123,10 @@ pub struct Scenario {
     pub network: Network,
     /// What goes wrong, and when.
     pub faults: Vec<(Duration, Fault)>,
-    /// The job.
+    /// The job: number 1.
     pub job: JobSpec,
+    /// Jobs that are submitted later, from number 2 on.
+    pub others: Vec<(Duration, JobSpec)>,
     /// What in the frame cannot be rendered.
     pub poison: Option<Poison>,
     /// How the job's own policy behaves.
@@ -150,7 +163,13 @@ impl Scenario {
                 assign,
                 min_nodes: machines.len() as u32,
                 audit: 0.0,
+                owner: "one".into(),
+                priority: 0,
+                after: Vec::new(),
+                attempts: ATTEMPTS_PER_PART,
+                patience: None,
             },
+            others: Vec::new(),
             poison: None,
             policy: ScriptPolicy::Good,
             work: 600.0,
@@ -195,6 +214,7 @@ impl Scenario {
             let (x, y) = (random.below(scenario.job.width), random.below(scenario.job.height));
             scenario.poison = Some(Poison { x, y, kills: random.happens(0.5) });
         }
+        scenario.add_jobs(&mut random);
         let faults = random.below(7);
         (0..faults).for_each(|_| scenario.add_fault(&mut random));
         scenario
@@ -213,10 +233,32 @@ impl Scenario {
         job.min_nodes = 1 + random.below(self.machines.len() as u32);
     }
 
+    /// Other jobs come while the first one runs, some of other submitters, ranks, or in a sequence; some have to wait for a while.
+    fn add_jobs(&mut self, random: &mut Random) {
+        for number in 2..2 + u64::from(random.below(6).saturating_sub(2)) {
+            let mut job = JobSpec { owner: ["one", "two", "three"][random.below(3) as usize].into(), ..self.job.clone() };
+            job.priority = [0, 0, 0, 10, -10][random.below(5) as usize];
+            job.name = format!("simulated {number}");
+            if random.happens(0.2) {
+                job.after = vec![JobId(number - 1)];
+            }
+            let at = random.seconds(0.0, 8.0);
+            self.others.push((at, job));
+            if random.happens(0.2) {
+                let since = at + random.seconds(0.0, 5.0);
+                self.faults.push((since, Fault::PauseJob(JobId(number))));
+                self.faults.push((since + random.seconds(0.0, 10.0), Fault::ResumeJob(JobId(number))));
+            }
+            if random.happens(0.1) {
+                self.faults.push((random.seconds(0.0, 8.0), Fault::Rank(JobId(number), 20)));
+            }
+        }
+    }
+
     /// Something goes wrong somewhere; who was killed often comes back. Machine 0 comes back always.
     fn add_fault(&mut self, random: &mut Random) {
         let (at, machine) = (random.seconds(0.0, 8.0), random.below(self.machines.len() as u32) as usize);
-        let fault = match random.below(28) {
+        let fault = match random.below(30) {
             0..=5 => Fault::Kill(machine),
             6 => Fault::Leave(machine),
             7..=10 => Fault::Pause(machine, random.seconds(0.1, 15.0)),
@@ -231,13 +273,23 @@ impl Scenario {
             22 | 23 if machine > 0 => Fault::Corrupt(machine),
             24 => Fault::DamagePixels,
             25 => Fault::Stall(random.seconds(0.05, 20.0)),
-            _ if random.happens(0.1) => Fault::Cancel,
+            26 => Fault::Drain(machine, random.seconds(0.0, 5.0)),
+            27 => Fault::Upgrade,
+            _ if random.happens(0.1) => Fault::Cancel(JobId(1 + u64::from(random.below(1 + self.others.len() as u32)))),
             _ => Fault::RestartCoordinator,
         };
         self.faults.push((at, fault));
-        let ends = matches!(fault, Fault::Kill(_) | Fault::Leave(_) | Fault::Hang(_));
+        let ends = matches!(fault, Fault::Kill(_) | Fault::Leave(_) | Fault::Hang(_) | Fault::Drain(..));
         if ends && (machine == 0 || random.happens(0.6)) {
             self.faults.push((at + random.seconds(0.05, 20.0), Fault::Start(machine)));
+        }
+        if fault == Fault::Upgrade {
+            // Nodes follow, one after the other; the first one always.
+            for machine in 0..self.machines.len() {
+                if machine == 0 || random.happens(0.7) {
+                    self.faults.push((at + random.seconds(0.5, 20.0), Fault::Start(machine)));
+                }
+            }
         }
     }
 

@@ -3,15 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::{cmp::Reverse, time::Duration};
 
-use super::machine::{Act, Node, Task, true_hash};
+use super::machine::{Act, Node, Task, canary, true_hash};
 use super::random::Random;
 use super::{Fault, Run, Scenario, ScriptPolicy};
-use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, LeaseId, NodeSnapshot, NodeState, Outcome, Question, ToNode};
+use crate::farm::{
+    Answer, Command, Event, Farm, Incarnation, JobId, JobRecord, JobSpec, LeaseId, NodeSnapshot, NodeState, Outcome, Question, ToNode,
+};
 use crate::journal::Filter;
 use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT, LATE_TICK};
+use crate::manifest::{AttemptOutcome, PartEntry};
 use crate::schedule::{NodeId, PartId, assign, split};
 use tessera_engine::part::Rect;
 
+/// The job that a run tells most of.
 const JOB: JobId = JobId(1);
 
 /// Parts beyond which the books are not checked after every step.
@@ -32,7 +36,11 @@ enum Happening {
     /// A node's connection is closed by the coordinator.
     Closed(usize, u64),
     /// Pixels of a part are on disk.
-    Stored(LeaseId, PartId, u64),
+    Stored(JobId, LeaseId, PartId, u64),
+    /// A node that drains has no more time.
+    Goes(usize, u64),
+    /// A job is submitted.
+    Submit(JobId, Box<JobSpec>),
     Fault(Fault),
 }
 
@@ -46,6 +54,8 @@ pub struct World {
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
     epoch: u64,
+    /// The build that is installed.
+    build: u32,
     /// Until when the coordinator stands still.
     stalled: Duration,
     /// Whether pixels of a part are to be found damaged.
@@ -53,7 +63,7 @@ pub struct World {
     filter: Filter,
     journal: Vec<(Duration, Event)>,
     /// Parts on disk, with the attempt whose pixels they are.
-    disk: BTreeMap<PartId, LeaseId>,
+    disk: BTreeMap<(JobId, PartId), LeaseId>,
     /// Attempts whose pixels do not count any more.
     revoked: BTreeSet<LeaseId>,
     /// Deliveries that the farm has to say something about.
@@ -67,8 +77,8 @@ impl World {
     /// A world in which nothing has happened yet.
     pub fn new(scenario: Scenario) -> Self {
         let mut farm = Farm::new(scenario.config.clone());
-        let submitted = Event::JobSubmitted { job: JOB, spec: scenario.job.clone() };
-        farm.step(Duration::ZERO, submitted.clone());
+        let begin = [Event::Restarted { build: canary(0) }, Event::JobSubmitted { job: JOB, spec: scenario.job.clone() }];
+        begin.iter().for_each(|event| drop(farm.step(Duration::ZERO, event.clone())));
         let nodes: Vec<Node> = scenario.machines.iter().enumerate().map(|(i, machine)| Node::new(i, machine.clone())).collect();
         let powers = nodes.iter().map(|node| (node.id, node.machine.speed * f64::from(node.machine.lanes))).collect();
         #[expect(clippy::expect_used, reason = "it was submitted above")]
@@ -81,10 +91,11 @@ impl World {
             agenda: BinaryHeap::new(),
             happenings: Vec::new(),
             epoch: 0,
+            build: 0,
             stalled: Duration::ZERO,
             damaged: false,
             filter: Filter::default(),
-            journal: vec![(Duration::ZERO, submitted)],
+            journal: begin.into_iter().map(|event| (Duration::ZERO, event)).collect(),
             disk: BTreeMap::new(),
             revoked: BTreeSet::new(),
             open: BTreeSet::new(),
@@ -92,6 +103,7 @@ impl World {
             trace: blake3::Hasher::new(),
             run: Run {
                 outcome: None,
+                others: BTreeMap::new(),
                 record,
                 violations: Vec::new(),
                 trace: [0; 32],
@@ -106,12 +118,15 @@ impl World {
             world.nodes.iter().enumerate().map(|(i, node)| (node.machine.starts, Fault::Start(i))).collect();
         let faults = world.scenario.faults.clone();
         starts.into_iter().chain(faults).for_each(|(at, fault)| world.plan(at, Happening::Fault(fault)));
+        for (number, (at, job)) in (JOB.0 + 1..).zip(world.scenario.others.clone()) {
+            world.plan(at, Happening::Submit(JobId(number), Box::new(job)));
+        }
         world
     }
 
-    /// Lets everything happen until the job is over.
+    /// Lets everything happen until all jobs are over.
     pub fn run(mut self) -> Run {
-        while self.run.outcome.is_none() && self.run.violations.is_empty() && self.now < self.scenario.horizon {
+        while !self.is_over() && self.run.violations.is_empty() && self.now < self.scenario.horizon {
             let next = self.agenda.peek().map(|Reverse((at, ..))| *at);
             match (self.farm.next_deadline().map(|deadline| deadline.max(self.stalled)), next) {
                 (Some(deadline), next) if next.is_none_or(|next| deadline < next) => {
@@ -122,14 +137,21 @@ impl World {
                 _ => break,
             }
         }
-        if self.run.outcome.is_none() && self.run.violations.is_empty() {
-            self.violation("the job does not end");
+        if !self.is_over() && self.run.violations.is_empty() {
+            let open = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none());
+            let open: Vec<_> = open.map(|job| (job.id.0, job.phase, job.paused, job.committed, job.parts)).collect();
+            let nodes: Vec<_> = self.farm.nodes().into_iter().map(|node| (node.name, node.state, node.holds, node.queued)).collect();
+            self.violation(format!("jobs do not end: {open:?}; {nodes:?}"));
         }
-        if let Some(record) = self.farm.record(JOB) {
+        if let Some(record) = self.farm.record(JOB).filter(|_| self.run.outcome.is_none()) {
             self.run.record = record;
         }
         self.run.trace = *self.trace.finalize().as_bytes();
         self.run
+    }
+
+    fn is_over(&self) -> bool {
+        self.run.outcome.is_some() && self.run.others.len() == self.scenario.others.len()
     }
 
     /// Time has come. If it is long past, the coordinator itself was away: it gives all nodes time to be heard, as the real one does.
@@ -174,10 +196,12 @@ impl World {
             }
             Happening::Beat(node, life) if self.lives(node, life) => self.beat(node),
             Happening::Closed(node, life) if self.lives(node, life) => self.start(node),
-            Happening::Stored(lease, part, epoch) if epoch == self.epoch => {
-                self.store(lease, part);
-                self.step(Event::Committed { job: JOB, lease });
+            Happening::Stored(job, lease, part, epoch) if epoch == self.epoch => {
+                self.store(job, lease, part);
+                self.step(Event::Committed { job, lease });
             }
+            Happening::Submit(job, spec) => self.step(Event::JobSubmitted { job, spec: *spec }),
+            Happening::Goes(node, life) if self.lives(node, life) => self.fault(Fault::Leave(node)),
             Happening::Fault(fault) => self.fault(fault),
             _ => {}
         }
@@ -190,14 +214,15 @@ impl World {
     /// A process that stands still does nothing until it goes on; through a parted network streams deliver when it is whole again.
     fn held_up(&self, happening: &Happening) -> Option<Duration> {
         let (node, until) = match happening {
-            Happening::Finish(node, life, ..) | Happening::Beat(node, life) | Happening::Closed(node, life) => {
-                (self.lives(*node, *life), self.nodes[*node].paused)
-            }
+            Happening::Finish(node, life, ..)
+            | Happening::Beat(node, life)
+            | Happening::Closed(node, life)
+            | Happening::Goes(node, life) => (self.lives(*node, *life), self.nodes[*node].paused),
             Happening::ToNode(_, node, life, _) => (self.lives(*node, *life), self.nodes[*node].paused.max(self.nodes[*node].deaf)),
             Happening::FromNode(_, node, life, _) => {
                 (true, self.stalled.max(if self.lives(*node, *life) { self.nodes[*node].mute } else { self.stalled }))
             }
-            Happening::Farm(..) | Happening::Stored(..) => (true, self.stalled),
+            Happening::Farm(..) | Happening::Stored(..) | Happening::Submit(..) => (true, self.stalled),
             Happening::Fault(_) => return None,
         };
         (node && until > self.now).then_some(until)
@@ -256,11 +281,11 @@ impl World {
         }
     }
 
-    fn store(&mut self, lease: LeaseId, part: PartId) {
+    fn store(&mut self, job: JobId, lease: LeaseId, part: PartId) {
         if self.revoked.contains(&lease) {
             return;
         }
-        if let Some(first) = self.disk.insert(part, lease) {
+        if let Some(first) = self.disk.insert((job, part), lease) {
             self.violation(format!("part {} is committed twice, by leases {} and {}", part.0, first.0, lease.0));
         }
     }
@@ -281,7 +306,7 @@ impl World {
 
     /// Checks the farm's books: after every step, or now and then where they are thick.
     fn judge(&mut self) {
-        let parts = self.farm.jobs().first().map_or(0, |job| job.parts);
+        let parts = self.farm.jobs().iter().map(|job| job.parts).max().unwrap_or_default();
         if !self.run.steps.is_multiple_of(1 + (parts / THICK) as u64) {
             return;
         }
@@ -323,22 +348,22 @@ impl World {
                     self.plan(at, Happening::Farm(Event::PolicyAnswered { id, answer }, self.epoch));
                 }
             }
-            Command::Commit { part, lease, .. } => {
+            Command::Commit { job, part, lease } => {
                 if !self.open.remove(&lease) {
                     self.violation(format!("lease {} is to be committed, but its pixels are not here", lease.0));
                 }
                 let at = self.now + Duration::from_secs_f64(self.scenario.disk * self.random.between(0.5, 2.0));
-                self.plan(at, Happening::Stored(lease, part, self.epoch));
+                self.plan(at, Happening::Stored(job, lease, part, self.epoch));
             }
             Command::Discard { lease, .. } => _ = self.open.remove(&lease),
-            Command::Revoke { part, lease, .. } => {
+            Command::Revoke { job, part, lease } => {
                 self.revoked.insert(lease);
-                if self.disk.get(&part) == Some(&lease) {
-                    self.disk.remove(&part);
+                if self.disk.get(&(job, part)) == Some(&lease) {
+                    self.disk.remove(&(job, part));
                 }
             }
-            Command::Assemble { .. } => self.assemble(),
-            Command::End { outcome, .. } => self.run.outcome = Some(outcome),
+            Command::Assemble { job } => self.assemble(job),
+            Command::End { job, outcome } => self.end(job, outcome),
         }
     }
 
@@ -371,41 +396,61 @@ impl World {
         }
     }
 
+    fn end(&mut self, job: JobId, outcome: Outcome) {
+        if job != JOB {
+            if self.run.others.insert(job, outcome).is_some() {
+                self.violation(format!("job {} ends twice", job.0));
+            }
+            return;
+        }
+        self.run.outcome = Some(outcome);
+        if let Some(record) = self.farm.record(JOB) {
+            self.run.record = record;
+        }
+    }
+
     /// Writes the outputs, if every pixel is on disk once.
-    fn assemble(&mut self) {
-        let committed = self.farm.committed(JOB);
-        let rects: Vec<_> = committed.iter().map(|(_, rect, _)| *rect).chain(self.farm.holes(JOB)).collect();
-        if let Err(wrong) = split::validate(&rects, self.scenario.job.width, self.scenario.job.height) {
+    fn assemble(&mut self, job: JobId) {
+        let (committed, Some(record)) = (self.farm.committed(job), self.farm.record(job)) else { return };
+        let rects: Vec<_> = committed.iter().map(|(_, rect, _)| *rect).chain(self.farm.holes(job)).collect();
+        if let Err(wrong) = split::validate(&rects, record.spec.width, record.spec.height) {
             self.violation(format!("the picture is not whole: {wrong}"));
         }
-        if committed.iter().any(|(part, _, lease)| self.disk.get(part) != Some(lease)) {
+        if committed.iter().any(|(part, _, lease)| self.disk.get(&(job, *part)) != Some(lease)) {
             self.violation("the farm takes parts for committed that are not on disk");
         }
-        self.judge_pixels();
+        self.judge_pixels(job, &record);
         let at = self.now + Duration::from_millis(50);
         let event = match committed.first().filter(|_| std::mem::take(&mut self.damaged)) {
-            Some((part, ..)) => Event::PixelsLost { job: JOB, part: *part, reason: "the checksum is wrong".into() },
-            None => Event::Assembled { job: JOB, result: Ok(()) },
+            Some((part, ..)) => Event::PixelsLost { job, part: *part, reason: "the checksum is wrong".into() },
+            None => Event::Assembled { job, result: Ok(()) },
         };
         self.plan(at, Happening::Farm(event, self.epoch));
     }
 
-    /// Where every part was compared, no wrong pixels are in the picture.
-    fn judge_pixels(&mut self) {
-        let Some(record) = self.farm.record(JOB).filter(|_| self.scenario.job.audit >= 1.0) else { return };
+    /// All pixels are of the build that the job began on, but for those of nodes that compute wrongly; and where every part was compared, there are none
+    /// of those.
+    fn judge_pixels(&mut self, job: JobId, record: &JobRecord) {
+        let build = record.build.map_or(0, |build| build.revision);
         let alone = |warning: &String| warning.contains("there is no third to decide") || warning.contains("no other node was there");
+        let compared = record.spec.audit >= 1.0 && !record.warnings.iter().any(alone);
+        let excused = |part: &PartEntry| {
+            let by = part.attempts.iter().find(|attempt| attempt.outcome == AttemptOutcome::Committed);
+            !compared && by.is_some_and(|attempt| self.nodes[attempt.node.0 as usize].corrupt)
+        };
         let wrong = record.parts.iter().find(|part| {
             let [x, y, width, height] = part.rect;
-            let right: String = true_hash(Rect { x, y, width, height }).iter().map(|byte| format!("{byte:02x}")).collect();
-            part.hash.as_ref().is_some_and(|hash| *hash != right)
+            let right = true_hash(job, build, Rect { x, y, width, height });
+            let right: String = right.iter().map(|byte| format!("{byte:02x}")).collect();
+            part.hash.as_ref().is_some_and(|hash| *hash != right) && !excused(part)
         });
-        if let Some(part) = wrong.filter(|_| !record.warnings.iter().any(alone)) {
-            self.violation(format!("part {} has wrong pixels", part.id.0));
+        if let Some(part) = wrong {
+            self.violation(format!("part {} of job {} has wrong pixels", part.id.0, job.0));
         }
     }
 
     fn start(&mut self, node: usize) {
-        self.nodes[node].start();
+        self.nodes[node].start(self.build);
         self.killed.remove(&node);
         let life = self.nodes[node].life;
         self.nodes[node].link = self.now;
@@ -444,8 +489,21 @@ impl World {
             Fault::Slow(node, factor) => self.nodes[node].slowness = factor,
             Fault::FailPart(node) => self.nodes[node].fails_next = true,
             Fault::RestartCoordinator => self.restart(),
-            Fault::Cancel => self.step(Event::JobCancelled { job: JOB, reason: "not wanted".into() }),
-            Fault::Leave(_) => {}
+            Fault::Upgrade => {
+                self.build += 1;
+                self.restart();
+            }
+            Fault::Cancel(job) => self.step(Event::JobCancelled { job, reason: "not wanted".into() }),
+            Fault::PauseJob(job) => self.step(Event::JobPaused { job, reason: "another goes first".into() }),
+            Fault::ResumeJob(job) => self.step(Event::JobResumed { job, reason: "its turn".into() }),
+            Fault::Rank(job, priority) => self.step(Event::JobRanked { job, priority }),
+            Fault::Drain(node, length) if self.nodes[node].alive => {
+                let (id, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
+                self.say(node, 0.0, Event::NodeDraining { node: id, incarnation });
+                let life = self.nodes[node].life;
+                self.plan(self.now + length, Happening::Goes(node, life));
+            }
+            Fault::Leave(_) | Fault::Drain(..) => {}
         }
     }
 
@@ -460,7 +518,7 @@ impl World {
             self.violation(format!("the replayed journal differs: {difference}"));
         }
         (self.farm, self.epoch) = (again, self.epoch + 1);
-        self.step(Event::Restarted);
+        self.step(Event::Restarted { build: canary(self.build) });
         for node in 0..self.nodes.len() {
             if self.nodes[node].alive {
                 let joined = self.nodes[node].joined();

@@ -232,6 +232,7 @@ fn node_word(state: NodeState) -> &'static str {
     match state {
         NodeState::Proving => "proving",
         NodeState::Ready => "ready",
+        NodeState::Draining => "draining",
         NodeState::Refused => "refused",
         NodeState::Suspected => "suspected",
         NodeState::Lost => "lost",

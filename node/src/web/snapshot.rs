@@ -50,6 +50,12 @@ pub struct JobStatus {
     pub id: u64,
     /// Its name.
     pub name: String,
+    /// Who submitted it.
+    pub owner: String,
+    /// Its rank.
+    pub priority: i32,
+    /// Whether it waits until someone resumes it.
+    pub paused: bool,
     /// How far it is.
     pub phase: JobPhase,
     /// How it ended, in words; empty while it has not.
@@ -78,8 +84,23 @@ impl Snapshot {
             let ((width, height), trouble) = seen(job.id)?;
             let parts = if job.parts <= STATUS_PARTS { farm.parts(job.id) } else { Vec::new() };
             let (phase, outcome) = (job.phase, outcome(job.outcome));
-            let JobSnapshot { id, name, seconds, parts: total, committed, .. } = job;
-            Some(JobStatus { id: id.0, name, phase, outcome, trouble, width, height, seconds, total, committed, parts })
+            let JobSnapshot { id, name, owner, priority, paused, seconds, parts: total, committed, .. } = job;
+            Some(JobStatus {
+                id: id.0,
+                name,
+                owner,
+                priority,
+                paused,
+                phase,
+                outcome,
+                trouble,
+                width,
+                height,
+                seconds,
+                total,
+                committed,
+                parts,
+            })
         };
         Self {
             program: manifest::program(),

@@ -37,6 +37,9 @@ pub fn snapshot() -> Snapshot {
         jobs: vec![JobStatus {
             id: 1,
             name: "mini_demo".into(),
+            owner: "someone".into(),
+            priority: 0,
+            paused: false,
             phase: JobPhase::Rendering,
             outcome: String::new(),
             trouble: Some("its folder is gone".into()),

@@ -90,6 +90,11 @@ mod tests {
             assign: schedule::Assign::Naive,
             min_nodes: 1,
             audit: 0.0,
+            owner: "someone".into(),
+            priority: 0,
+            after: Vec::new(),
+            attempts: 3,
+            patience: None,
         };
         farm.step(std::time::Duration::ZERO, farm::Event::JobSubmitted { job: farm::JobId(1), spec });
         farm.record(farm::JobId(1)).unwrap()

@@ -73,6 +73,8 @@ pub enum FromNode {
         /// Why.
         reason: String,
     },
+    /// The node is about to go: it finishes what its lanes render, and wants nothing new.
+    Draining,
 }
 
 /// Coordinator to node, on the control stream.

@@ -25,7 +25,7 @@ pub use frame::{FrameError, decode, encode, patience, read, read_exactly, write}
 pub use join::{JoinRequest, JoinResponse, NewKey, joiner, requested_key};
 pub use message::{FromNode, Heartbeat, Hello, NodeStream, PartHeader, ToNode};
 pub use refusal::{Refusal, explain, explain_peer, peer_certificate};
-pub use request::{FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Request, Response, Status, is_plain_name};
+pub use request::{FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Place, Request, Response, Status, Terms, is_plain_name};
 
 /// The protocol, as TLS negotiates it: peers that speak another one do not connect. Raise it with any change of a message.
 pub const ALPN: &[u8] = b"tessera/1";

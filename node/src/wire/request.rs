@@ -17,8 +17,8 @@ pub enum Request {
     Submit {
         /// The job.
         description: Box<JobDescription>,
-        /// Nodes to wait for before the probe.
-        min_nodes: u32,
+        /// How it stands in the queue.
+        terms: Terms,
     },
     /// Say what there is: one [`Response::Status`].
     Status,
@@ -49,6 +49,41 @@ pub enum Request {
         /// Its name.
         node: String,
     },
+    /// Give a job that waits or runs another place in the queue: [`Response::Done`].
+    Move {
+        /// The job.
+        job: JobId,
+        /// Where to.
+        place: Place,
+    },
+}
+
+/// How a job stands in the queue.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Terms {
+    /// Nodes to wait for before the probe.
+    pub min_nodes: u32,
+    /// Its rank: jobs of higher ones go first.
+    pub priority: i32,
+    /// Jobs that have to be finished before it begins.
+    pub after: Vec<JobId>,
+}
+
+impl Default for Terms {
+    fn default() -> Self {
+        Self { min_nodes: 1, priority: 0, after: Vec::new() }
+    }
+}
+
+/// A place in the queue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Place {
+    /// It waits until it is resumed.
+    Paused,
+    /// It waits no more.
+    Resumed,
+    /// Among jobs of this priority.
+    Ranked(i32),
 }
 
 /// The coordinator's answers.
@@ -146,6 +181,12 @@ pub struct JobStatus {
     pub job: JobId,
     /// Its name.
     pub name: String,
+    /// Who submitted it.
+    pub owner: String,
+    /// Its rank.
+    pub priority: i32,
+    /// Whether nothing of it is handed out until it is resumed.
+    pub paused: bool,
     /// Where it stands.
     pub state: JobState,
     /// Parts in all; 0 until it is split.

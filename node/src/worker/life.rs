@@ -113,6 +113,11 @@ impl Life {
         (life, received)
     }
 
+    /// Whether it holds anything that the coordinator waits for.
+    pub fn is_busy(&self) -> bool {
+        !self.running.is_empty() || !self.outbox.is_empty()
+    }
+
     /// What is to be handed in once more.
     pub fn unsettled(&self) -> Vec<Arc<Delivery>> {
         self.outbox.values().cloned().collect()

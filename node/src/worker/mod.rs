@@ -4,6 +4,7 @@
 //! whatever the load. What a lane has rendered is kept until the coordinator says that it is settled, over as many connections as it takes.
 
 mod cache;
+mod drain;
 mod fetch;
 mod lanes;
 mod life;
@@ -12,7 +13,7 @@ mod session;
 use std::{
     net::{SocketAddr, ToSocketAddrs},
     path::PathBuf,
-    time::Instant,
+    time::{Duration, Instant},
 };
 
 use tokio::{
@@ -22,6 +23,7 @@ use tokio::{
 
 use self::{
     cache::Cache,
+    drain::{Drain, Step},
     lanes::Lanes,
     life::{Done, Life},
     session::{Backoff, Ended, Node},
@@ -49,29 +51,29 @@ pub struct Options {
     pub cache: Option<PathBuf>,
     /// Bytes of fetched assets.
     pub cache_bytes: u64,
+    /// How long it may take to finish what its lanes render when it is told to go.
+    pub drain: Duration,
 }
 
-/// Works until `stop` turns true; joins again for ever when the connection breaks.
+/// Works until it is told to go, and joins again for ever when the connection breaks. Told once it drains; told twice it goes at once.
 ///
 /// # Errors
 /// When the machine gives no threads, no socket or no cache folder; never because of the network.
-pub fn run(options: &Options, stop: watch::Receiver<bool>) -> Result<()> {
+pub fn run(options: &Options, told: watch::Receiver<u32>) -> Result<()> {
     let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
     let cache = Cache::new(options.cache.as_deref(), options.cache_bytes)
         .map_err(|error| Error::new(ExitCode::File, format!("the cache {:?}: {error}", options.cache)))?;
-    let node =
-        Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, stop, watchdog: Watchdog::new() };
+    let node = Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, watchdog: Watchdog::new() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
-    runtime.block_on(join_for_ever(options, &node))
+    runtime.block_on(join_for_ever(options, &node, Drain::new(told, options.drain)))
 }
 
-async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
-    let mut stop = node.stop.clone();
+async fn join_for_ever(options: &Options, node: &Node, mut drain: Drain) -> Result<()> {
     let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
     let (mut backoff, mut trouble) = (Backoff::default(), Trouble::default());
     loop {
         node.watchdog.feed();
-        match join_once(options, node, &mut life, &mut done, &mut backoff).await {
+        match join_once(options, node, &mut life, &mut done, (&mut backoff, &mut drain)).await {
             Ended::Stopped => return Ok(()),
             Ended::Broken(reason) => {
                 if trouble.is_news(&reason) {
@@ -90,7 +92,7 @@ async fn join_for_ever(options: &Options, node: &Node) -> Result<()> {
             }
         }
         tokio::select! {
-            _ = stop.wait_for(|&stop| stop) => return Ok(()),
+            Step::Go = drain.next(life.is_busy()) => return Ok(()),
             () = sleep(backoff.pause()) => {}
         }
     }
@@ -115,7 +117,7 @@ async fn join_once(
     node: &Node,
     life: &mut Life,
     done: &mut mpsc::UnboundedReceiver<Done>,
-    backoff: &mut Backoff,
+    (backoff, drain): (&mut Backoff, &mut Drain),
 ) -> Ended {
     let connect = async {
         let address = resolve(&options.coordinator).await?;
@@ -123,9 +125,8 @@ async fn join_once(
         let connection = wire::connect(&endpoint, address).await.map_err(|refusal| refusal.to_string())?;
         Ok::<_, String>((endpoint, connection))
     };
-    let mut stop = node.stop.clone();
     let connected = tokio::select! {
-        _ = stop.wait_for(|&stop| stop) => return Ended::Stopped,
+        Step::Go = drain.next(life.is_busy()) => return Ended::Stopped,
         connected = timeout(CONNECT_TIMEOUT, connect) => connected,
     };
     let (endpoint, connection) = match connected {
@@ -135,7 +136,7 @@ async fn join_once(
     };
     tracing::info!(coordinator = options.coordinator, name = options.identity.peer().name, "connected");
     let connected = Instant::now();
-    let ended = session::run(node, &connection, life, done).await;
+    let ended = session::run(node, &connection, life, done, drain).await;
     if connected.elapsed() > CONNECT_TIMEOUT {
         *backoff = Backoff::default();
     }

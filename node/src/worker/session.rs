@@ -4,12 +4,13 @@ use std::{sync::Arc, time::Duration};
 
 use quinn::{Connection, ConnectionError, RecvStream, SendStream};
 use tokio::{
-    sync::{mpsc, watch},
+    sync::mpsc,
     time::{Instant, MissedTickBehavior, interval, timeout},
 };
 
 use super::{
     cache::Cache,
+    drain::{Drain, Step},
     fetch::Fetcher,
     lanes::Lanes,
     life::{Delivery, Done, Life, Reaction},
@@ -38,27 +39,39 @@ pub struct Node {
     pub lane_count: u32,
     /// Assets.
     pub cache: Cache,
-    /// Turns true when the node is to end.
-    pub stop: watch::Receiver<bool>,
     /// Fed with every heartbeat and every attempt to connect.
     pub watchdog: Watchdog,
 }
 
 /// Works over one connection until it ends.
-pub async fn run(node: &Node, connection: &Connection, life: &mut Life, done: &mut mpsc::UnboundedReceiver<Done>) -> Ended {
+pub async fn run(
+    node: &Node,
+    connection: &Connection,
+    life: &mut Life,
+    done: &mut mpsc::UnboundedReceiver<Done>,
+    drain: &mut Drain,
+) -> Ended {
     let (mut say, mut heard) = match open_control(node, connection, life).await {
         Ok(control) => control,
         Err(error) => return broken(connection, &error),
     };
     let fetcher = Fetcher { connection: connection.clone(), cache: node.cache.clone(), lanes: node.lanes.clone(), done: life.done.clone() };
     life.unsettled().into_iter().for_each(|delivery| deliver(connection, delivery));
-    let (mut pulse, mut stop) = (Pulse::new(connection), node.stop.clone());
+    if drain.has_begun()
+        && let Err(error) = wire::write(&mut say, &FromNode::Draining, CONTROL_BYTES).await
+    {
+        return broken(connection, &error.to_string());
+    }
+    let mut pulse = Pulse::new(connection);
     let mut beat = interval(HEARTBEAT_INTERVAL);
     beat.set_missed_tick_behavior(MissedTickBehavior::Delay);
     loop {
         let reaction = tokio::select! {
             biased;
-            _ = stop.wait_for(|&stop| stop) => return farewell(connection, say).await,
+            step = drain.next(life.is_busy()) => match step {
+                Step::Begin => Reaction::Say(FromNode::Draining),
+                Step::Go => return farewell(connection, say).await,
+            },
             _ = beat.tick() => {
                 node.watchdog.feed();
                 if let Err(error) = pulse.beat(connection, life) {

@@ -5,10 +5,14 @@ use std::sync::Arc;
 use mlua::Value;
 use tessera_engine::description::{Film, Filter, Quality};
 
-use super::{Form, Function, plan, render};
+use super::{
+    Form, Function,
+    frames::{self, numbered, of_frame},
+    plan, render,
+};
 use crate::{
     job::{
-        Output, PixelType,
+        Frames, Output, PixelType,
         context::Context,
         handle::{JobNode, Policy, Thing},
         keys::{Field, Keys, Range},
@@ -20,13 +24,16 @@ use crate::{
 pub const FUNCTIONS: &[Function] = &[Function {
     path: "job",
     form: Form::Table,
-    keys: &["scene", "camera", "film", "render", "quality", "probe", "split", "assign", "output", "seed", "audit"],
+    keys: &[
+        "scene", "camera", "film", "render", "quality", "probe", "split", "assign", "output", "seed", "audit", "frames", "attempts",
+        "patience",
+    ],
     make: job,
 }];
 
 /// Keys of the tables within a job: annotations and reference are held to them.
 #[cfg(test)]
-pub const TABLES: &[(&str, &[&str])] = &[("film", FILM), ("quality", QUALITY), ("output", OUTPUT)];
+pub const TABLES: &[(&str, &[&str])] = &[("film", FILM), ("quality", QUALITY), ("output", OUTPUT), ("frames", frames::FRAMES)];
 
 const FILM: &[&str] = &["width", "height", "filter"];
 const QUALITY: &[&str] = &["samples"];
@@ -34,15 +41,17 @@ const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure"];
 
 const EDGE: u32 = 65_536;
 const EXPOSURE: Range = Range { lowest: -100.0, highest: 100.0, open: false, words: "stops from -100 to 100" };
+const PATIENCE: Range = Range { lowest: 0.0, highest: limits::LONGEST_PATIENCE, open: false, words: "seconds, up to a year of them" };
 const SHARE: Range = Range { lowest: 0.0, highest: 1.0, open: false, words: "a share from 0 to 1" };
 
 fn job(keys: &Keys) -> mlua::Result<Value> {
-    let scene = keys.required("scene")?.thing("a scene (tessera.scene)", |handle| match &handle.thing {
+    let frames = frames::frames(keys)?;
+    let scene = of_frame(keys.required("scene")?, frames.as_ref())?.thing("a scene (tessera.scene)", |handle| match &handle.thing {
         Thing::Scene(scene) => Some(Arc::clone(scene)),
         _ => None,
     })?;
     let camera = keys.or("camera", None, |field| {
-        field.thing("a camera (tessera.perspective)", |handle| match &handle.thing {
+        of_frame(field, frames.as_ref())?.thing("a camera (tessera.perspective)", |handle| match &handle.thing {
             Thing::Camera(camera) => Some(Some(camera.clone())),
             _ => None,
         })
@@ -58,10 +67,12 @@ fn job(keys: &Keys) -> mlua::Result<Value> {
     let probe = keys.or("probe", Probe::Shared { scale: plan::DEFAULT_SCALE }, |field| probe(&field, &film))?;
     let split = keys.or("split", Policy::BuiltIn(plan::DEFAULT_SPLIT), |field| split(&field, &film))?;
     let assign = keys.or("assign", Policy::BuiltIn(Assign::EarliestFinish), |field| assign(&field))?;
-    let output = output(keys)?;
+    let output = output(keys, frames.as_ref())?;
     let seed = keys.or("seed", 0, |field| field.integer(0, 1 << 53))?;
     let audit = keys.or("audit", 0.0, |field| field.number(SHARE))?;
-    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, seed, audit };
+    let attempts = keys.or("attempts", limits::ATTEMPTS_PER_PART, |field| field.integer32(1, limits::MOST_ATTEMPTS_PER_PART))?;
+    let patience = keys.or("patience", None, |field| field.number(PATIENCE).map(Some))?;
+    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, seed, audit, attempts, patience, frames };
     keys.make(|_| Thing::Job(Arc::new(job)))
 }
 
@@ -132,12 +143,12 @@ fn assign(field: &Field) -> mlua::Result<Policy<Assign>> {
 }
 
 /// Plain file names: the client puts them into the folder that the user chose.
-fn output(job: &Keys) -> mlua::Result<Output> {
+fn output(job: &Keys, frames: Option<&(u32, Frames)>) -> mlua::Result<Output> {
     let name = Context::of(job.lua)?.name.clone();
-    let manifest = format!("{name}.manifest.json");
+    let manifest = numbered(&format!("{name}.manifest.json"), ".manifest.json", frames);
     let defaults =
         Output { exr: format!("{name}.exr"), png: Some(format!("{name}.png")), manifest, pixel_type: PixelType::Float, exposure: 0.0 };
-    let Some(field) = job.optional("output")? else { return Ok(defaults) };
+    let Some(field) = job.optional("output")? else { return Ok(defaults.numbered(frames)) };
     let keys = field.table(OUTPUT)?;
     let exr = keys.or("exr", defaults.exr, |field| file_name(&field, ".exr"))?;
     let png = keys.or("png", defaults.png, |field| match field.value {
@@ -147,7 +158,7 @@ fn output(job: &Keys) -> mlua::Result<Output> {
     let types = [("float", PixelType::Float), ("half", PixelType::Half)];
     let pixel_type = keys.or("pixel_type", PixelType::Float, |field| field.choice(&types))?;
     let exposure = keys.or("exposure", 0.0, |field| field.number(EXPOSURE))?;
-    Ok(Output { exr, png, manifest: defaults.manifest, pixel_type, exposure })
+    Ok(Output { exr, png, manifest: defaults.manifest, pixel_type, exposure }.numbered(frames))
 }
 
 fn file_name(field: &Field, ending: &str) -> mlua::Result<String> {

@@ -3,6 +3,7 @@
 mod camera;
 mod color;
 mod group;
+mod frames;
 mod job;
 mod light;
 mod material;
@@ -25,6 +26,7 @@ use super::{
     place::Place,
 };
 
+pub use frames::PARAMETER as FRAME_PARAMETER;
 #[cfg(test)]
 pub use random::METHODS;
 

@@ -129,3 +129,35 @@ fn outside_models_load() {
         }
     }
 }
+
+#[test]
+fn each_frame_of_a_sequence_is_a_job_of_its_own() {
+    let text = job_with(
+        "return tessera.job {
+  frames = { 8, 12 },
+  scene = function(frame)
+    return tessera.scene { objects = { tessera.sphere { center = { 0, 0, frame }, radius = 1, material = grey } } }
+  end,
+  camera = function(frame) return tessera.perspective { eye = { frame, 0, -5 }, look_at = { 0, 0, 0 } } end,
+  film = { width = 8, height = 8 },
+  output = { exr = \"walk.exr\" },
+}",
+    );
+    let first = run(&text, &[], &[], BUDGET).unwrap();
+    assert_eq!(first.sequence(&Default::default()).unwrap().numbers().collect::<Vec<_>>(), [8, 9, 10, 11, 12]);
+    let chosen = run(&text, &[], &[("frame", "12")], BUDGET).unwrap();
+    assert_eq!(chosen.sequence(&[("frame".to_owned(), "12".to_owned())].into()), None, "one that was chosen is alone");
+    for (job, frame) in [(&first, 8.0), (&chosen, 12.0)] {
+        let description = &job.description;
+        assert_eq!(spheres(job)[0].0, [0.0, 0.0, frame]);
+        let Camera::Perspective { eye, .. } = description.frame.camera;
+        assert_eq!(eye, [frame, 0.0, -5.0]);
+        let number = format!("{frame:04}");
+        assert_eq!(description.output.exr, format!("walk.{number}.exr"));
+        assert!(description.output.png.as_ref().unwrap().ends_with(&format!(".{number}.png")));
+        assert!(description.output.manifest.ends_with(&format!(".{number}.manifest.json")), "{}", description.output.manifest);
+        assert!(description.name.ends_with(&format!(".{number}")), "{}", description.name);
+    }
+    let beyond = run(&text, &[], &[("frame", "13")], BUDGET).err().unwrap().message;
+    assert!(beyond.contains("--set frame=13: it is no frame of 8 to 12"), "{beyond}");
+}

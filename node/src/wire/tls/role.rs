@@ -34,6 +34,8 @@ pub enum Deed {
     Delete,
     /// To let a node out of quarantine.
     Release,
+    /// To pause, resume or rank a job.
+    Move,
 }
 
 impl fmt::Display for Role {
@@ -57,6 +59,7 @@ impl fmt::Display for Deed {
             Self::Cancel => "cancel jobs",
             Self::Delete => "delete jobs",
             Self::Release => "release nodes",
+            Self::Move => "pause, resume or rank jobs",
         })
     }
 }
@@ -75,7 +78,7 @@ impl Role {
     pub fn may(self, deed: Deed, own: bool) -> bool {
         match (self, deed) {
             (Self::Operator, _) | (Self::Submitter | Self::Observer, Deed::Look) | (Self::Submitter, Deed::Submit) => true,
-            (Self::Submitter, Deed::Fetch | Deed::Cancel | Deed::Delete) => own,
+            (Self::Submitter, Deed::Fetch | Deed::Cancel | Deed::Delete | Deed::Move) => own,
             (Self::Submitter, Deed::Release) | (Self::Observer, _) | (Self::Node | Self::Coordinator, _) => false,
         }
     }

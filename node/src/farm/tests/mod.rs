@@ -1,5 +1,7 @@
 //! Transitions of the state machine, one by one. Whole schedules of faults are the simulator's.
 
+mod queue;
+
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -9,6 +11,7 @@ use crate::manifest::{AttemptOutcome, EventKind};
 use crate::schedule::{Assign, CostMap, NodeId, PartId, Plan, Probe, Split};
 
 const JOB: JobId = JobId(1);
+const BUILD: Build = Build { revision: 1, canary: [7; 32] };
 
 /// A farm, a clock, and what was commanded last.
 struct Bench {
@@ -21,6 +24,7 @@ impl Bench {
     /// Ready nodes of one lane, and a job of 16 equal parts that needs no probe.
     fn new(nodes: u32, assign: Assign) -> Self {
         let mut bench = Self { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
+        bench.does(Event::Restarted { build: BUILD });
         bench.does(Event::JobSubmitted { job: JOB, spec: spec(assign, nodes) });
         (0..nodes).for_each(|node| bench.ready(node, 1));
         (0..nodes).for_each(|node| bench.prepared(node, 1));
@@ -37,7 +41,7 @@ impl Bench {
         let info = NodeInfo { name: format!("n{node}"), lanes: 1, build: "b".into(), address: "a".into() };
         self.does(Event::NodeJoined { node: NodeId(node), incarnation: Incarnation(life), info });
         assert!(self.said.contains(&send(node, life, ToNode::Prove)));
-        self.does(Event::NodeProved { node: NodeId(node), incarnation: Incarnation(life), verdict: Ok(()) });
+        self.does(Event::NodeProved { node: NodeId(node), incarnation: Incarnation(life), canary: BUILD.canary });
     }
 
     fn prepared(&mut self, node: u32, life: u64) {
@@ -108,6 +112,11 @@ fn spec(assign: Assign, min_nodes: u32) -> JobSpec {
         assign,
         min_nodes,
         audit: 0.0,
+        owner: "someone".into(),
+        priority: 0,
+        after: Vec::new(),
+        attempts: 3,
+        patience: None,
     }
 }
 
@@ -132,8 +141,9 @@ fn a_node_that_fails_the_canary_gets_no_work_and_hears_why() {
     let info = NodeInfo { name: "odd".into(), lanes: 1, build: "b".into(), address: "a".into() };
     let (node, incarnation) = (NodeId(7), Incarnation(1));
     bench.does(Event::NodeJoined { node, incarnation, info });
-    bench.does(Event::NodeProved { node, incarnation, verdict: Err("other bytes".into()) });
-    assert_eq!(bench.said, [Command::Close { node, incarnation, reason: "other bytes".into() }]);
+    bench.does(Event::NodeProved { node, incarnation, canary: [8; 32] });
+    let [Command::Close { reason, .. }] = &bench.said[..] else { panic!("{:?}", bench.said) };
+    assert!(reason.contains("other bytes than the coordinator"), "{reason}");
     assert_eq!(bench.count(EventKind::Refused), 1);
     assert_eq!(bench.farm.nodes().iter().find(|known| known.id == node).unwrap().state, NodeState::Refused);
 }

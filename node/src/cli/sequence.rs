@@ -1,0 +1,140 @@
+//! Jobs on their way to a farm and back: one picture, or the frames of a sequence, each a job of its own.
+
+use std::path::{Path, PathBuf};
+
+use tessera_engine::scene::Scene;
+
+use super::{
+    client::Client,
+    progress::Show,
+    render::{outcome, report},
+    script::Script,
+};
+use crate::{
+    error::{Error, Result},
+    farm::JobId,
+    job::{JobDescription, LoadedJob},
+    limits::PRIORITY,
+    wire::{JobState, Terms},
+};
+
+/// How jobs stand in a farm's queue.
+#[derive(clap::Args)]
+pub struct Standing {
+    /// Rank in the farm's queue: jobs of higher priority go first. Above 0 takes an operator's key.
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(i32).range(i64::from(-PRIORITY)..=i64::from(PRIORITY)), allow_negative_numbers = true)]
+    priority: i32,
+    /// A job that has to be finished before this one begins; may be given several times.
+    #[arg(long, value_name = "JOB", value_parser = super::client::job_number)]
+    after: Vec<u64>,
+}
+
+impl Standing {
+    /// As the farm is told.
+    pub fn terms(&self, min_nodes: u32) -> Terms {
+        Terms { min_nodes, priority: self.priority, after: self.after.iter().copied().map(JobId).collect() }
+    }
+}
+
+/// A job that a farm has taken, and what is needed to fetch its files and tell of them.
+pub struct Submitted {
+    /// Its number.
+    pub job: JobId,
+    /// Its frame, where it is one of several.
+    frame: Option<u32>,
+    manifest: String,
+    warnings: Vec<String>,
+}
+
+/// Submits a job, or one for each frame of its sequence: the farm renders the first while later ones are made. `taken` is told of each.
+///
+/// # Errors
+/// When the script fails for a frame, or the coordinator refuses one; the frames before it are submitted then.
+pub async fn submit(
+    client: &Client,
+    script: &Script,
+    first: LoadedJob,
+    mut terms: Terms,
+    mut taken: impl FnMut(&Submitted, &JobDescription),
+) -> Result<Vec<Submitted>> {
+    let (mut all, sequence, before) = (Vec::new(), first.sequence(&script.parameters()), terms.after.clone());
+    let mut rest = sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1);
+    let mut next = Some(first);
+    while let Some(loaded) = next.take() {
+        let job = client.submit(&loaded.description, &loaded.assets, &terms).await.map_err(|error| told(error, &all))?;
+        let LoadedJob { description, frames, .. } = loaded;
+        let frame = frames.map(|(frame, _)| frame).filter(|_| sequence.is_some());
+        let submitted = Submitted { job, frame, manifest: description.output.manifest.clone(), warnings: description.warnings.clone() };
+        taken(&submitted, &description);
+        all.push(submitted);
+        if sequence.is_some_and(|frames| frames.in_order) {
+            terms.after = before.iter().copied().chain([job]).collect();
+        }
+        if let Some(frame) = rest.next() {
+            next = Some(script.load_frame(frame).map_err(|error| told(error, &all))?.0);
+        }
+    }
+    Ok(all)
+}
+
+/// An error in the middle of a sequence: what is submitted already goes on.
+fn told(error: Error, before: &[Submitted]) -> Error {
+    match before {
+        [first, .., last] => error.with_help(format!("the frames before it are jobs {} to {}, and go on", first.job.0, last.job.0)),
+        _ => error,
+    }
+}
+
+/// Follows jobs to their ends, one after the other, and puts their files into a folder. .
+///
+/// # Errors
+/// The first that there is; other frames are fetched all the same.
+pub async fn follow(client: &Client, jobs: &[Submitted], show: Show, output: &Path) -> Result<()> {
+    let mut failed = None;
+    for of in jobs {
+        if let Err(error) = follow_one(client, of, show, output).await {
+            if jobs.len() > 1 && !show.quiet {
+                eprintln!("{}error: {error}", of.label());
+            }
+            failed.get_or_insert(error);
+        }
+    }
+    failed.map_or(Ok(()), Err)
+}
+
+async fn follow_one(client: &Client, of: &Submitted, show: Show, output: &Path) -> Result<()> {
+    let mut progress = show.progress();
+    if of.frame.is_some() {
+        progress.say(&format!("{}job {}", of.label(), of.job.0));
+    }
+    let state = client.watch(of.job, |job, nodes| progress.see(job, nodes)).await?;
+    progress.end();
+    let ended = outcome(state.clone());
+    if !matches!(state, JobState::Finished | JobState::Incomplete(_)) {
+        return ended;
+    }
+    let files: Vec<PathBuf> = client.fetch(of.job, output).await?;
+    ended.map_err(|error| error.with_help(format!("what there is stands in {}", output.display())))?;
+    report(show, &files, &output.join(&of.manifest), &of.warnings)
+}
+
+impl Submitted {
+    fn label(&self) -> String {
+        self.frame.map_or_else(String::new, |frame| format!("frame {frame}: "))
+    }
+}
+
+/// Renders what `render` says for every frame of a sequence, or once.
+///
+/// # Errors
+/// The first that there is.
+pub fn each_frame(script: &Script, first: (LoadedJob, Scene), mut render: impl FnMut(&LoadedJob, &Scene) -> Result<()>) -> Result<()> {
+    let sequence = first.0.sequence(&script.parameters());
+    render(&first.0, &first.1)?;
+    drop(first);
+    for frame in sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1) {
+        let (loaded, scene) = script.load_frame(frame)?;
+        render(&loaded, &scene)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,237 @@
+//! Which jobs run, and which of them hands out next: by priority, then by how much their submitters have had, then in order of submission.
+//!
+//! A job with the first claim takes every lane that it has work for; what it leaves is for the next one, so that no lane waits for the last parts of
+//! a frame. Submitters of equal priority share: each part that is handed out counts by its cost, and whoever has had least is next. Who comes
+//! (again) is taken to have had as much as those who are there: nobody saves up, and nobody is punished for having been alone.
+//! (Start-time fair queueing: Goyal, Vin, Cheng, 1996.)
+
+use std::{cmp::Reverse, collections::BTreeMap, collections::BTreeSet};
+
+use serde::{Deserialize, Serialize};
+
+use super::job::{Job, Phase};
+use super::{Event, Farm, JobId, JobSpec, Outcome};
+use crate::limits::{JOBS_AT_ONCE, JOBS_KEPT, JOBS_WAITING, NODES_PER_TURN};
+use crate::manifest::EventKind;
+
+/// What the farm knows of its jobs' order.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Queue {
+    /// Jobs that have begun and are not over.
+    pub open: BTreeSet<JobId>,
+    /// Cost that was handed out to each submitter who has open jobs.
+    had: BTreeMap<String, f64>,
+    /// Open jobs that have work for all lanes, as it was when the queue was last looked at.
+    busy: BTreeSet<JobId>,
+    /// Whether something else has happened since that may let a job begin.
+    stale: bool,
+}
+
+impl Farm {
+    pub(super) fn job_submitted(&mut self, id: JobId, spec: JobSpec) {
+        if self.jobs.contains_key(&id) {
+            return;
+        }
+        let waiting = self.jobs.values().filter(|job| job.outcome().is_none()).count();
+        self.jobs.insert(id, Job::new(id, spec, self.turn.now));
+        self.queue.stale = true;
+        if waiting >= JOBS_WAITING {
+            let reason = format!("{JOBS_WAITING} jobs wait already");
+            self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason }));
+        }
+        self.forget_jobs();
+    }
+
+    pub(super) fn job_cancelled(&mut self, id: JobId, reason: String) {
+        self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Cancelled { reason }));
+    }
+
+    /// Whoever submitted a job, or an operator, changes its place in the queue.
+    pub(super) fn job_moved(&mut self, event: Event) {
+        self.queue.stale = true;
+        match event {
+            Event::JobPaused { job, reason } => self.with_job(job, |job, turn, _| job.pause(turn, reason)),
+            Event::JobResumed { job, reason } => self.with_job(job, |job, turn, _| job.resume(turn, reason)),
+            Event::JobRanked { job, priority } => self.with_job(job, |job, _, _| job.spec.priority = priority),
+            _ => {}
+        }
+    }
+
+    /// Jobs that are over are known for a while: the oldest go, but those that others wait for.
+    fn forget_jobs(&mut self) {
+        let awaited: BTreeSet<JobId> =
+            self.jobs.values().filter(|job| job.phase == Phase::Waiting).flat_map(|job| job.spec.after.iter().copied()).collect();
+        let over: Vec<JobId> = self.jobs.values().filter(|job| job.outcome().is_some()).map(|job| job.id).collect();
+        let old = over.iter().take(over.len().saturating_sub(JOBS_KEPT));
+        old.filter(|id| !awaited.contains(id)).for_each(|id| _ = self.jobs.remove(id));
+    }
+
+    /// Lets every open job do what it can, in order of their claims, and begins others while lanes are left.
+    pub(super) fn advance(&mut self) {
+        loop {
+            self.note_begun();
+            self.take_turns();
+            self.note_ends();
+            if !self.begin_next() {
+                break;
+            }
+        }
+        self.note_begun();
+    }
+
+    /// Hands out until nobody has anything to hand out: who shares with another submitter gives way after a few parts.
+    fn take_turns(&mut self) {
+        let mut rest: Vec<JobId> = self.queue.open.iter().copied().collect();
+        while let Some(id) = rest.iter().copied().min_by(|a, b| self.compare_claims(*a, *b)) {
+            let shares = rest.iter().any(|other| self.is_rival(id, *other));
+            let quota = if shares { 1 + self.nodes.len() / NODES_PER_TURN } else { usize::MAX };
+            (self.turn.quota, self.turn.handed_out) = (quota, (0, 0.0));
+            self.with_job(id, |job, turn, nodes| job.advance(turn, nodes));
+            let (count, cost) = std::mem::take(&mut self.turn.handed_out);
+            if let Some(job) = self.jobs.get(&id).filter(|_| cost.is_finite()) {
+                *self.queue.had.entry(job.spec.owner.clone()).or_default() += cost;
+            }
+            if count < quota {
+                rest.retain(|other| *other != id);
+            }
+        }
+        self.turn.quota = 0;
+    }
+
+    fn compare_claims(&self, a: JobId, b: JobId) -> std::cmp::Ordering {
+        let claim = |id: JobId| {
+            let spec = self.jobs.get(&id).map(|job| &job.spec);
+            let had = spec.and_then(|spec| self.queue.had.get(&spec.owner)).copied().unwrap_or_default();
+            (Reverse(spec.map(|spec| spec.priority)), had)
+        };
+        let ((rank, had), (other_rank, other_had)) = (claim(a), claim(b));
+        rank.cmp(&other_rank).then(had.total_cmp(&other_had)).then(a.cmp(&b))
+    }
+
+    /// Whether two jobs are of equal priority and of different submitters.
+    fn is_rival(&self, a: JobId, b: JobId) -> bool {
+        let (Some(a), Some(b)) = (self.jobs.get(&a), self.jobs.get(&b)) else { return false };
+        a.spec.priority == b.spec.priority && a.spec.owner != b.spec.owner
+    }
+
+    /// Attempts that come to the front of what their nodes hold may have begun.
+    fn note_begun(&mut self) {
+        for id in std::mem::take(&mut self.turn.freed) {
+            self.with_open(|job, turn, nodes| job.note_begun(turn, nodes, id));
+        }
+    }
+
+    /// Takes jobs that are over off the books. What the latest of them did is known until another ends.
+    fn note_ends(&mut self) {
+        if !std::mem::take(&mut self.turn.ended) {
+            return;
+        }
+        self.queue.stale = true;
+        let over = |id: &JobId| self.jobs.get(id).is_none_or(|job| job.outcome().is_some());
+        let ended: Vec<JobId> = self.queue.open.iter().copied().filter(over).collect();
+        ended.iter().for_each(|id| _ = self.queue.open.remove(id));
+        let owners: BTreeSet<&String> = self.open_jobs().map(|job| &job.spec.owner).collect();
+        let had = self.queue.had.iter().filter(|(owner, _)| owners.contains(owner)).map(|(owner, had)| (owner.clone(), *had)).collect();
+        self.queue.had = had;
+        let now = self.turn.now;
+        self.jobs.values_mut().filter(|job| job.log.ended.is_some_and(|at| at < now)).for_each(Job::forget_details);
+    }
+
+    pub(super) fn open_jobs(&self) -> impl Iterator<Item = &Job> {
+        self.queue.open.iter().filter_map(|id| self.jobs.get(id))
+    }
+
+    /// Begins the job whose turn it is, if there is one. Says whether anything has changed.
+    fn begin_next(&mut self) -> bool {
+        let lanes: usize = self.nodes.values().filter(|node| node.is_ready()).map(|node| node.lanes()).sum();
+        let busy: BTreeSet<JobId> = self.open_jobs().filter(|job| job.is_busy(lanes)).map(|job| job.id).collect();
+        if !self.queue.stale && busy == self.queue.busy {
+            return false;
+        }
+        self.queue.busy = busy;
+        if self.fail_orphans() {
+            return true;
+        }
+        let Some(id) = self.next_to_begin() else {
+            self.queue.stale = false;
+            return false;
+        };
+        self.join_queue(id);
+        self.with_job(id, |job, turn, nodes| job.begin(turn, nodes));
+        true
+    }
+
+    /// Fails a job that waits for one that came to no good end.
+    fn fail_orphans(&mut self) -> bool {
+        let waiting = self.jobs.values().filter(|job| job.phase == Phase::Waiting);
+        let orphan = waiting.filter_map(|job| Some((job.id, self.trouble_ahead(job)?))).next();
+        let Some((id, reason)) = orphan else { return false };
+        self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason }));
+        self.note_ends();
+        true
+    }
+
+    fn trouble_ahead(&self, job: &Job) -> Option<String> {
+        let bad = |id: &JobId| match self.jobs.get(id)?.outcome()? {
+            Outcome::Finished => None,
+            Outcome::Incomplete { .. } => Some(format!("job {}, which it waits for, came out incomplete", id.0)),
+            Outcome::Failed { .. } => Some(format!("job {}, which it waits for, failed", id.0)),
+            Outcome::Cancelled { .. } => Some(format!("job {}, which it waits for, was cancelled", id.0)),
+        };
+        job.spec.after.iter().find_map(bad)
+    }
+
+    /// The waiting job with the first claim that nothing holds back.
+    fn next_to_begin(&self) -> Option<JobId> {
+        if self.queue.open.len() >= JOBS_AT_ONCE {
+            return None;
+        }
+        let waiting = self.jobs.values().filter(|job| job.phase == Phase::Waiting && !job.paused);
+        let due = waiting.filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
+        due.filter(|job| !self.is_held_back(job)).map(|job| job.id).min_by(|a, b| self.compare_claims(*a, *b))
+    }
+
+    /// Whether another job has work for all lanes, and a claim before this one. Submitters of equal priority run side by side.
+    fn is_held_back(&self, job: &Job) -> bool {
+        let before = |other: &Job| {
+            let (rank, own) = (other.spec.priority, job.spec.priority);
+            rank > own || rank == own && other.spec.owner == job.spec.owner
+        };
+        self.queue.busy.iter().filter_map(|id| self.jobs.get(id)).any(before)
+    }
+
+    /// A job's submitter is taken to have had as much as the one who has had least of those who are there.
+    fn join_queue(&mut self, id: JobId) {
+        self.queue.open.insert(id);
+        let Some(owner) = self.jobs.get(&id).map(|job| job.spec.owner.clone()) else { return };
+        let least = self.queue.had.values().copied().min_by(f64::total_cmp).unwrap_or_default();
+        self.queue.had.entry(owner).or_insert(least);
+    }
+}
+
+impl Job {
+    /// Whether it has work, or will soon have, for more lanes than the farm has.
+    fn is_busy(&self, lanes: usize) -> bool {
+        if self.paused || self.deserted.is_some() {
+            return false;
+        }
+        match self.phase {
+            Phase::Waiting | Phase::Assembling | Phase::Over(_) => false,
+            Phase::Gathering(_) | Phase::Probing(_) | Phase::Splitting | Phase::Assigning => true,
+            Phase::Rendering => self.waiting_parts() > lanes,
+        }
+    }
+
+    /// Nothing of it is handed out any more; what nodes hold they finish.
+    fn pause(&mut self, turn: &super::turn::Turn, reason: String) {
+        if !std::mem::replace(&mut self.paused, true) {
+            self.log.event(turn.now, EventKind::Paused, None, Vec::new(), reason);
+        }
+    }
+
+    fn resume(&mut self, turn: &super::turn::Turn, reason: String) {
+        if std::mem::take(&mut self.paused) {
+            self.log.event(turn.now, EventKind::Resumed, None, Vec::new(), reason);
+        }
+    }
+}
