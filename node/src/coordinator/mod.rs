@@ -152,8 +152,9 @@ impl Coordinator {
         let metrics = Arc::new(Metrics::default());
         let (disk, farm) = Disk::open(&options.data, options.farm, inputs.clone(), metrics.clone())?;
         let thinker = Thinker::new(inputs.clone());
-        let canary = tokio::task::spawn_blocking(Canary::render).await.map_err(|error| error.to_string()).and_then(|canary| canary);
-        let canary = canary.map_err(|error| Error::new(ExitCode::Internal, format!("the canary part cannot be rendered: {error}")))?;
+        let data = options.data.clone();
+        let canary = tokio::task::spawn_blocking(move || Canary::render(&data)).await;
+        let canary = canary.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))??;
         let (published, status) = watch::channel(Arc::default());
         let page = watch::Sender::new(Arc::default());
         let pulse = Pulse { inputs: inputs.clone() };

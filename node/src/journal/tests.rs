@@ -24,6 +24,11 @@ fn spec() -> JobSpec {
     }
 }
 
+/// The attempt of this number that a coordinator gives out after its first start.
+fn lease(number: u64) -> LeaseId {
+    LeaseId((1 << 40) + number)
+}
+
 /// One node up to its first parts, with heartbeats between.
 fn life() -> Vec<(Duration, Event)> {
     let (node, incarnation, job) = (NodeId(0), Incarnation(7), JobId(1));
@@ -37,10 +42,10 @@ fn life() -> Vec<(Duration, Event)> {
         Event::Tick,
         Event::Prepared { node, incarnation, job, result: Ok(()) },
     ];
-    for lease in 1..5 {
-        events.push(Event::Rendered { node, incarnation, job, lease: LeaseId(lease), hash: [1; 32], seconds: 1.0 });
+    for lease in (1..5).map(lease) {
+        events.push(Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
         events.push(Event::NodeHeard { node, incarnation });
-        events.push(Event::Committed { job, lease: LeaseId(lease) });
+        events.push(Event::Committed { job, lease });
     }
     (1..).map(|i| Duration::from_millis(i * 100)).zip(events).collect()
 }
@@ -162,7 +167,7 @@ fn pixels_on_disk_are_not_rendered_again_after_a_crash_before_their_commit() {
     events[..=delivered].iter().for_each(|(at, event)| _ = farm.step(*at, event.clone()));
     // Lost: the pixels were in memory. Kept: the journal's segment has them, and the coordinator says so before the restart.
     let mut kept = farm.clone();
-    kept.step(Duration::from_secs(2), Event::Committed { job: JobId(1), lease: LeaseId(1) });
+    kept.step(Duration::from_secs(2), Event::Committed { job: JobId(1), lease: lease(1) });
     let orders = |farm: &mut Farm| -> usize {
         farm.step(Duration::from_secs(2), Event::Restarted { build: BUILD });
         let (node, incarnation) = (NodeId(0), Incarnation(8));

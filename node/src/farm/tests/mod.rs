@@ -233,6 +233,7 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
 #[test]
 fn a_prepared_node_that_dies_takes_its_deadline_with_it() {
     let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
+    bench.does(Event::Restarted { build: BUILD });
     bench.does(Event::JobSubmitted { job: JOB, spec: spec(Assign::Paper, 2) });
     (0..2).for_each(|node| bench.ready(node, 1));
     bench.prepared(0, 1);
