@@ -43,6 +43,9 @@ return tessera.job {
 }
 "#;
 
+/// A pixel in the middle of [`JOB`]: `tessera-saboteur crashes` dies of the parts that it is in.
+pub const POISON: [u32; 2] = [131, 99];
+
 /// The program, and a folder to work in.
 pub struct Program {
     binary: &'static str,

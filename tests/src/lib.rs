@@ -3,4 +3,5 @@
 //! Tests of one room stand in that room; here stand those that need the whole.
 
 pub mod farm;
+pub mod relay;
 pub mod s1;

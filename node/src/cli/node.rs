@@ -2,6 +2,8 @@
 
 use std::{io::Read, path::PathBuf, process, thread};
 
+use tessera_engine::part;
+
 use super::{
     render::seconds,
     runtime::{count_signals, start_logs},
@@ -55,6 +57,7 @@ pub fn run(args: Args) -> Result<()> {
         cache: args.cache.or(file.cache),
         cache_bytes: args.cache_bytes.or(file.cache_bytes).unwrap_or(CACHE_BYTES),
         drain: args.drain.or(file.drain).map_or(Ok(DRAIN_LIMIT), seconds)?,
+        render: part::render,
     };
     if let Some(warning) = options.identity.warning() {
         tracing::warn!(warning, "renew this node's key");

@@ -11,6 +11,7 @@ mod scenario;
 mod world;
 
 pub use campaign::{Campaign, broken_by, shrink};
+pub use random::Random;
 pub use run::Run;
 pub use scenario::{Fault, Machine, Network, Poison, Scenario, ScriptPolicy};
 pub use world::World;

@@ -16,7 +16,7 @@ use tessera_engine::{
 };
 use tokio::sync::mpsc;
 
-use super::lanes::Lanes;
+use super::{Renderer, lanes::Lanes};
 use crate::{
     farm::{Incarnation, JobId, LeaseId},
     wire::{FromNode, PartHeader, ToNode},
@@ -83,6 +83,7 @@ pub struct Life {
     /// Where lanes put what they come to.
     pub done: mpsc::UnboundedSender<Done>,
     lanes: Lanes,
+    render: Renderer,
     jobs: BTreeMap<JobId, Job>,
     probes: BTreeMap<ProbeId, Probe>,
     last_probe: ProbeId,
@@ -98,12 +99,13 @@ impl Drop for Life {
 
 impl Life {
     /// A new life, and the other end of its `done`.
-    pub fn new(incarnation: Incarnation, lanes: Lanes) -> (Self, mpsc::UnboundedReceiver<Done>) {
+    pub fn new(incarnation: Incarnation, lanes: Lanes, render: Renderer) -> (Self, mpsc::UnboundedReceiver<Done>) {
         let (done, received) = mpsc::unbounded_channel();
         let life = Self {
             incarnation,
             done,
             lanes,
+            render,
             jobs: BTreeMap::new(),
             probes: BTreeMap::new(),
             last_probe: 0,
@@ -235,10 +237,10 @@ impl Life {
         };
         let cancel = Arc::new(AtomicBool::new(false));
         self.running.insert((job, lease), cancel.clone());
-        let done = self.done.clone();
+        let (done, render) = (self.done.clone(), self.render);
         let work = move || {
             let start = Instant::now();
-            let rendered = part::render(&scene, rect, samples, &cancel).ok()?;
+            let rendered = render(&scene, rect, samples, &cancel).ok()?;
             let header = PartHeader { job, lease, frame, seconds: start.elapsed().as_secs_f64(), hash: rendered.hash() };
             Some(Delivery { header, bytes: rendered.to_bytes() })
         };

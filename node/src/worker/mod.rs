@@ -13,9 +13,14 @@ mod session;
 use std::{
     net::{SocketAddr, ToSocketAddrs},
     path::PathBuf,
+    sync::atomic::AtomicBool,
     time::{Duration, Instant},
 };
 
+use tessera_engine::{
+    part::{Cancelled, Rect, RenderedPart, SampleRange},
+    scene::Scene,
+};
 use tokio::{
     sync::{mpsc, watch},
     time::{sleep, timeout},
@@ -39,6 +44,9 @@ use crate::{
     },
 };
 
+/// Renders one part: [`tessera_engine::part::render`]. A node of the tests, and of no one else, does it wrongly.
+pub type Renderer = fn(&Scene, Rect, SampleRange, &AtomicBool) -> Result<RenderedPart, Cancelled>;
+
 /// How a node is set up.
 pub struct Options {
     /// Host and port of the coordinator. The name is looked up at every attempt to connect, for addresses change.
@@ -53,6 +61,8 @@ pub struct Options {
     pub cache_bytes: u64,
     /// How long it may take to finish what its lanes render when it is told to go.
     pub drain: Duration,
+    /// What its lanes do with a part.
+    pub render: Renderer,
 }
 
 /// Works until it is told to go, and joins again for ever when the connection breaks. Told once it drains; told twice it goes at once.
@@ -63,13 +73,14 @@ pub fn run(options: &Options, told: watch::Receiver<u32>) -> Result<()> {
     let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start: {error}"));
     let cache = Cache::new(options.cache.as_deref(), options.cache_bytes)
         .map_err(|error| Error::new(ExitCode::File, format!("the cache {:?}: {error}", options.cache)))?;
-    let node = Node { lanes: Lanes::start(options.lanes).map_err(internal)?, lane_count: options.lanes, cache, watchdog: Watchdog::new() };
+    let lanes = Lanes::start(options.lanes).map_err(internal)?;
+    let node = Node { lanes, lane_count: options.lanes, cache, watchdog: Watchdog::new() };
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().map_err(internal)?;
     runtime.block_on(join_for_ever(options, &node, Drain::new(told, options.drain)))
 }
 
 async fn join_for_ever(options: &Options, node: &Node, mut drain: Drain) -> Result<()> {
-    let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
+    let (mut life, mut done) = Life::new(Incarnation(tls::random()), node.lanes.clone(), options.render);
     let (mut backoff, mut trouble) = (Backoff::default(), Trouble::default());
     loop {
         node.watchdog.feed();
@@ -88,7 +99,7 @@ async fn join_for_ever(options: &Options, node: &Node, mut drain: Drain) -> Resu
                         "the coordinator closed the connection; trying again until it works"
                     );
                 }
-                (life, done) = Life::new(Incarnation(tls::random()), node.lanes.clone());
+                (life, done) = Life::new(Incarnation(tls::random()), node.lanes.clone(), options.render);
             }
         }
         tokio::select! {
