@@ -38,6 +38,7 @@ return tessera.job {
   quality = { samples = tessera.param("samples", 64) },
   probe   = tessera.probe.shared { scale = 1 / 16 },
   split   = tessera.split.grid { size = 32 },
+  audit   = tessera.param("audit", 0),
   assign  = tessera.assign.paper,
   output  = { exr = "job.exr", png = "job.png" },
 }
@@ -66,8 +67,8 @@ impl Program {
         self.folder.path().join(name)
     }
 
-    fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(self.binary);
+    fn command(&self, binary: &str, arguments: &[&str]) -> Command {
+        let mut command = Command::new(binary);
         command.current_dir(self.folder.path()).args(arguments).stdin(Stdio::null());
         for name in ["KEYS", "COORDINATOR", "CONFIG", "CACHE", "DATA", "LISTEN", "LANES", "LOG"] {
             command.env_remove(format!("TESSERA_{name}"));
@@ -82,7 +83,12 @@ impl Program {
 
     /// Starts a subcommand.
     pub fn start(&self, arguments: &[&str]) -> Running {
-        let mut child = self.command(arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
+        self.start_other(self.binary, arguments)
+    }
+
+    /// Starts another program in the folder.
+    pub fn start_other(&self, binary: &str, arguments: &[&str]) -> Running {
+        let mut child = self.command(binary, arguments).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
         let (sender, lines) = mpsc::channel();
         let stdout = child.stdout.take().expect("a pipe");
         thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|line| sender.send(line)));
@@ -240,11 +246,21 @@ impl Running {
         String::from_utf8_lossy(&self.complaints.lock().expect("no panic")).into_owned()
     }
 
+    /// Whether it has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().expect("a child").is_some()
+    }
+
+    /// What it has said on stderr so far.
+    pub fn complaints(&self) -> String {
+        String::from_utf8_lossy(&self.complaints.lock().expect("no panic")).into_owned()
+    }
+
     /// Waits until it has said this on stderr.
     pub fn wait_for_complaint(&self, said: &str) {
         let begin = Instant::now();
         loop {
-            let text = String::from_utf8_lossy(&self.complaints.lock().expect("no panic")).into_owned();
+            let text = self.complaints();
             if text.contains(said) {
                 return;
             }

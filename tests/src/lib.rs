@@ -4,4 +4,5 @@
 
 pub mod farm;
 pub mod relay;
+pub mod rig;
 pub mod s1;
