@@ -38,7 +38,8 @@ pub struct Rig {
     /// Where the coordinator listens; clients go there without a relay.
     pub address: String,
     coordinator: Option<Running>,
-    coordinator_arguments: Vec<String>,
+    /// What it is started with beyond address, folder and keys.
+    pub coordinator_arguments: Vec<String>,
     nodes: BTreeMap<String, Member>,
 }
 
