@@ -40,6 +40,12 @@ pub const IDLE_TIMEOUT: Duration = Duration::from_secs(15);
 /// Silence after which QUIC itself sends a packet.
 pub const KEEP_ALIVE: Duration = Duration::from_secs(1);
 
+/// Packets that may overtake another before QUIC takes that for lost, and sends ever less: on a network with jitter, many do.
+pub const OVERTAKING_PACKETS: u32 = 1000;
+
+/// The same by time, in round trips.
+pub const OVERTAKING_TIME: f32 = 2.0;
+
 /// Silence of the coordinator after which a node connects anew.
 pub const COORDINATOR_SILENCE: Duration = Duration::from_secs(3);
 

@@ -19,7 +19,7 @@ use super::{
 };
 use crate::{
     error::{Error, ExitCode, Result},
-    limits::{FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
+    limits::{FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, OVERTAKING_PACKETS, OVERTAKING_TIME, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
 };
 
 /// The protocol of those who have a key certified, see [`super::JoinRequest`].
@@ -148,6 +148,8 @@ fn transport(receive_window: u32, (bidirectional, unidirectional): (u32, u32)) -
     config
         .max_idle_timeout(IdleTimeout::try_from(IDLE_TIMEOUT).ok())
         .keep_alive_interval(Some(KEEP_ALIVE))
+        .packet_threshold(OVERTAKING_PACKETS)
+        .time_threshold(OVERTAKING_TIME)
         .max_concurrent_bidi_streams(VarInt::from_u32(bidirectional))
         .max_concurrent_uni_streams(VarInt::from_u32(unidirectional))
         .stream_receive_window(VarInt::from_u32(STREAM_WINDOW_BYTES))
