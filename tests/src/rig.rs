@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeMap,
     fs,
+    io::Write,
     path::PathBuf,
     sync::OnceLock,
     thread,
@@ -60,6 +61,20 @@ pub struct Outcome {
     pub exr: PathBuf,
 }
 
+/// A test that fails leaves its folder, with what each process said in `logs`.
+impl Drop for Rig {
+    fn drop(&mut self) {
+        if !thread::panicking() {
+            return;
+        }
+        let running = self.nodes.iter().filter_map(|(name, member)| Some((name.as_str(), member.process.as_ref()?)));
+        let running = running.chain(self.coordinator.as_ref().map(|coordinator| ("coordinator", coordinator)));
+        running.for_each(|(name, process)| self.log(name, &process.complaints()));
+        self.program.folder.disable_cleanup(true);
+        eprintln!("the farm's folder with logs is kept: {}", self.program.folder.path().display());
+    }
+}
+
 impl Rig {
     /// A coordinator, and keys and relays for these nodes, which do not run yet.
     pub fn new(binary: &'static str, nodes: &[&str], seed: u64) -> Self {
@@ -81,6 +96,13 @@ impl Rig {
     /// The names of all nodes.
     pub fn names(&self) -> Vec<String> {
         self.nodes.keys().cloned().collect()
+    }
+
+    fn log(&self, name: &str, text: &str) {
+        let folder = self.program.path("logs");
+        let _ = fs::create_dir_all(&folder);
+        let file = fs::OpenOptions::new().create(true).append(true).open(folder.join(format!("{name}.log")));
+        let _ = file.and_then(|mut file| file.write_all(text.as_bytes()));
     }
 
     fn member(&mut self, name: &str) -> &mut Member {
@@ -123,7 +145,9 @@ impl Rig {
 
     /// Kills a node (SIGKILL).
     pub fn kill(&mut self, name: &str) {
-        self.member(name).process.take().into_iter().for_each(|process| drop(process.kill()));
+        if let Some(process) = self.member(name).process.take() {
+            self.log(name, &process.kill().errors);
+        }
     }
 
     /// Sends a signal to a node.
@@ -136,9 +160,16 @@ impl Rig {
         self.coordinator.as_ref().expect("a coordinator that runs")
     }
 
-    /// Kills the coordinator (SIGKILL); returns what it had said on stderr.
-    pub fn kill_coordinator(&mut self) -> String {
-        self.coordinator.take().map(|running| running.kill().errors).unwrap_or_default()
+    /// Kills the coordinator (SIGKILL).
+    pub fn kill_coordinator(&mut self) {
+        if let Some(process) = self.coordinator.take() {
+            self.log("coordinator", &process.kill().errors);
+        }
+    }
+
+    /// Whether the coordinator's process runs.
+    pub fn is_led(&mut self) -> bool {
+        self.coordinator.as_mut().is_some_and(|process| !process.has_ended())
     }
 
     /// Starts it again on the same folder; returns how long that took until it listens.
@@ -193,8 +224,10 @@ impl Rig {
         let folder = format!("out-{job}");
         let fetched = self.client(&["fetch", job, "-o", &folder]);
         assert_eq!(fetched.code, Some(0), "{}\n{}", watched.errors, fetched.errors);
-        let exr = self.program.path(&folder).join("job.exr");
-        Outcome { code: watched.code, errors: watched.errors, manifest: manifest(&exr.with_extension("manifest.json")), exr }
+        let folder = self.program.path(&folder);
+        let mut files = fs::read_dir(&folder).expect("a folder").map(|entry| entry.expect("an entry").path());
+        let path = files.find(|path| path.to_string_lossy().ends_with(".manifest.json")).expect("a manifest");
+        Outcome { code: watched.code, errors: watched.errors, manifest: manifest(&path), exr: folder.join("job.exr") }
     }
 
     /// The same for one that has to end well: the undisturbed bytes, and each part once.
