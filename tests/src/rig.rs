@@ -234,7 +234,10 @@ impl Rig {
     pub fn finished(&self, job: &str, binary: &'static str) -> Value {
         let outcome = self.outcome(job);
         assert_eq!(outcome.code, Some(0), "{}", outcome.errors);
-        assert!(fs::read(&outcome.exr).expect("a picture") == undisturbed(binary), "the EXR's bytes differ from those of an undisturbed run");
+        assert!(
+            fs::read(&outcome.exr).expect("a picture") == undisturbed(binary),
+            "the EXR's bytes differ from those of an undisturbed run"
+        );
         assert_once(&outcome.manifest);
         outcome.manifest
     }

@@ -2,6 +2,7 @@
 
 use std::{
     net::{Ipv4Addr, SocketAddr},
+    path::Path,
     process::{ExitStatus, Stdio},
 };
 
@@ -59,29 +60,9 @@ impl LocalFarm {
         Ok(local)
     }
 
-    /// Its own process group, so that Ctrl-C reaches this process alone, which then ends its nodes in order.
     fn spawn(&self, identity: &Identity, lanes: u32) -> std::io::Result<Child> {
         let keys = identity.save(self.folder.path()).map_err(std::io::Error::other)?;
-        let quiet = std::env::var_os("TESSERA_LOG").unwrap_or_else(|| "error".into());
-        Command::new(std::env::current_exe()?)
-            .args([
-                "node",
-                "--with-parent",
-                "--coordinator",
-                &self.coordinator.address.to_string(),
-                "--lanes",
-                &lanes.to_string(),
-                "--keys",
-            ])
-            .arg(keys)
-            .env("TESSERA_LOG", quiet)
-            .env_remove("TESSERA_CONFIG")
-            .env_remove("TESSERA_CACHE")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::null())
-            .process_group(0)
-            .kill_on_drop(true)
-            .spawn()
+        node_command(&self.coordinator.address.to_string(), &keys, lanes)?.spawn()
     }
 
     /// A client of the farm.
@@ -115,6 +96,26 @@ impl LocalFarm {
         self.nodes.shutdown().await;
         self.coordinator.stop().await;
     }
+}
+
+/// A node process that ends with its owner. Its own process group, so that Ctrl-C reaches this process alone, which then ends its nodes in order.
+///
+/// # Errors
+/// When the system does not say which program this is.
+pub fn node_command(coordinator: &str, keys: &Path, lanes: u32) -> std::io::Result<Command> {
+    let quiet = std::env::var_os("TESSERA_LOG").unwrap_or_else(|| "error".into());
+    let mut command = Command::new(std::env::current_exe()?);
+    command
+        .args(["node", "--with-parent", "--coordinator", coordinator, "--lanes", &lanes.to_string(), "--keys"])
+        .arg(keys)
+        .env("TESSERA_LOG", quiet)
+        .env_remove("TESSERA_CONFIG")
+        .env_remove("TESSERA_CACHE")
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .process_group(0)
+        .kill_on_drop(true);
+    Ok(command)
 }
 
 async fn wait(name: String, mut child: Child) -> (String, std::io::Result<ExitStatus>) {

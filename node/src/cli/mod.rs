@@ -20,6 +20,7 @@ mod node;
 mod plan;
 mod progress;
 mod queue;
+mod real_farm;
 mod release;
 mod render;
 mod report;

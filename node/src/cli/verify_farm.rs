@@ -2,6 +2,7 @@
 
 use std::{num::NonZero, thread, time::Duration};
 
+use super::real_farm;
 use crate::{
     error::{Error, ExitCode, Result},
     manifest::{AttemptOutcome, EventKind},
@@ -19,6 +20,9 @@ pub struct Args {
     /// The first schedule's number; a long run is cut into several with this.
     #[arg(long, default_value_t = 0)]
     first: u64,
+    /// Instead, kills so many real node processes on this machine, and a coordinator now and then, and measures what that costs.
+    #[arg(long, value_name = "DEATHS", conflicts_with_all = ["schedules", "first"], value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    real: Option<u32>,
 }
 
 /// Farms that each figure is measured on.
@@ -35,6 +39,9 @@ const WORK: f64 = 3000.0;
 /// # Errors
 /// When a schedule breaks a promise, or a figure misses its goal.
 pub fn run(args: &Args) -> Result<()> {
+    if let Some(deaths) = args.real {
+        return real_farm::run(deaths);
+    }
     let threads = thread::available_parallelism().map_or(1, NonZero::get) as u64;
     schedules(args, threads)?;
     let figures = figures();

@@ -19,7 +19,10 @@ use super::{
 };
 use crate::{
     error::{Error, ExitCode, Result},
-    limits::{FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, OVERTAKING_PACKETS, OVERTAKING_TIME, RECEIVE_WINDOW_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER},
+    limits::{
+        FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, OVERTAKING_PACKETS, OVERTAKING_TIME, RECEIVE_WINDOW_BYTES,
+        STREAM_WINDOW_BYTES, STREAMS_PER_PEER,
+    },
 };
 
 /// The protocol of those who have a key certified, see [`super::JoinRequest`].
