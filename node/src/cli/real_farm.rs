@@ -256,7 +256,7 @@ impl Figures {
     fn take_death(&mut self, manifest: &Manifest, name: &str) {
         let Some(id) = manifest.nodes.iter().find(|node| node.name == name).map(|node| node.id) else { return };
         let of = |kind| manifest.events.iter().filter(move |event| event.kind == kind && event.node == Some(id));
-        let Some((event, silence)) = of(EventKind::Suspected).last().and_then(|event| Some((event, silence(event)?))) else { return };
+        let Some((event, silence)) = of(EventKind::Suspected).next_back().and_then(|event| Some((event, silence(event)?))) else { return };
         self.noticed.push(silence);
         let Some((part, begun)) = rendered_at(manifest, id, event.time) else { return };
         self.lost.push((event.time - silence - begun).max(0.0));
