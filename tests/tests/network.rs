@@ -1,10 +1,11 @@
 //! Bad networks between nodes and coordinator: partitions, loss, delay, disorder, damage, addresses that change. No life ends of it, no part is
 //! committed twice, and the bytes are those of an undisturbed run.
 
-use std::time::Duration;
+use std::{fs, time::Duration};
 
 use serde_json::Value;
 use tessera_tests::{
+    farm::JOB,
     relay::{BLOCKED, Way, Weather},
     rig::{Rig, attempts, committed, events, id, list},
 };
@@ -81,6 +82,8 @@ fn an_acknowledgement_that_is_lost_one_way_leads_to_one_commit() {
 /// Two nodes of which both have this weather in both directions.
 fn survives(name: &str, seed: u64, weather: Weather) {
     let mut rig = Rig::new(BINARY, &["attic", "cellar"], seed);
+    // Parts of a quarter of a second: shorter ones would only measure how long the way to the coordinator and back is.
+    fs::write(rig.program.path("job.lua"), JOB.replace("size = 32", "size = 64")).unwrap();
     ["attic", "cellar"].iter().for_each(|name| rig.relay(name).set_both(weather));
     ["attic", "cellar"].iter().for_each(|name| rig.start(name));
     rig.wait_until_ready(&["attic", "cellar"]);
