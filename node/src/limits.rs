@@ -43,8 +43,8 @@ pub const KEEP_ALIVE: Duration = Duration::from_secs(1);
 /// Packets that may overtake another before QUIC takes that for lost, and sends ever less: on a network with jitter, many do.
 pub const OVERTAKING_PACKETS: u32 = 1000;
 
-/// The same by time, in round trips.
-pub const OVERTAKING_TIME: f32 = 2.0;
+/// The same by time, in round trips: with jitter, one round trip is several times another.
+pub const OVERTAKING_TIME: f32 = 4.0;
 
 /// Silence of the coordinator after which a node connects anew.
 pub const COORDINATOR_SILENCE: Duration = Duration::from_secs(3);
