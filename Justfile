@@ -8,6 +8,10 @@ test:
 ci:
     .ci/run
 
+# Feeds garbage to all decoders, for so many seconds each.
+fuzz seconds="20":
+    tests/fuzz/run {{seconds}}
+
 # Puts sources in form.
 fmt:
     cargo fmt --all

@@ -98,10 +98,21 @@ impl Config {
     /// When it cannot be read or says something that there is not, with its line.
     pub fn read(path: Option<&Path>) -> Result<Self> {
         let Some(path) = path else { return Ok(Self::default()) };
-        let bad = |error: String| Error::new(ExitCode::File, format!("{}: {error}", path.display()));
-        let text = std::fs::read_to_string(path).map_err(|error| bad(error.to_string()))?;
-        toml::from_str(&text).map_err(|error| bad(error.to_string()))
+        let text = std::fs::read_to_string(path).map_err(|error| bad(path, &error))?;
+        Self::parse(path, &text)
     }
+
+    /// Reads the text of a settings file; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self> {
+        toml::from_str(text).map_err(|error| bad(path, &error))
+    }
+}
+
+fn bad(path: &Path, error: &impl std::fmt::Display) -> Error {
+    Error::new(ExitCode::File, format!("{}: {error}", path.display()))
 }
 
 /// A setting that must be given somewhere.

@@ -2,6 +2,7 @@
 //!
 //! Tests of one room stand in that room; here stand those that need the whole.
 
+pub mod decoders;
 pub mod farm;
 pub mod relay;
 pub mod rig;

@@ -11,6 +11,7 @@ mod normals;
 mod obj;
 mod ply;
 mod polygon;
+mod promises;
 mod reference;
 mod soup;
 mod warnings;
@@ -21,6 +22,8 @@ use glam::DAffine3;
 
 pub use crate::description::{AssetError, ModelFormat};
 pub use mesh::Mesh;
+#[doc(hidden)]
+pub use promises::check_promises;
 pub use reference::{model_format, model_references, part_references};
 
 use self::files::Files;

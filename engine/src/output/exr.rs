@@ -1,6 +1,10 @@
 //! The picture: scene-linear OpenEXR.
 
-use std::{io, path::Path};
+use std::{
+    fs::File,
+    io::{self, BufReader, Read, Seek},
+    path::Path,
+};
 
 use ::exr::{
     block::{
@@ -9,10 +13,13 @@ use ::exr::{
         writer::ChunksWriter,
     },
     error::Error,
-    image::{AnyChannels, FlatSamples, Image, Layer, read::read_first_flat_layer_from_file},
+    image::{
+        AnyChannels, FlatSamples, Image, Layer,
+        read::{image::ReadLayers, layers::ReadChannels, read as reader},
+    },
     math::Vec2,
     meta::{
-        BlockDescription,
+        BlockDescription, MetaData,
         attribute::{AttributeValue, ChannelDescription, Chromaticities, LineOrder, SampleType, Text},
         header::{Header, LayerAttributes},
     },
@@ -171,17 +178,42 @@ pub struct Picture {
 /// # Errors
 /// If the file cannot be read or has no such channels.
 pub fn read(path: &Path) -> Result<Picture, OutputError> {
-    read_picture(path).map_err(|reason| OutputError { path: path.to_owned(), doing: "read", reason })
+    let read = || {
+        let file = File::open(path)?;
+        let length = file.metadata()?.len();
+        read_picture(BufReader::new(file), length)
+    };
+    read().map_err(|reason| OutputError { path: path.to_owned(), doing: "read", reason })
 }
 
-fn read_picture(path: &Path) -> io::Result<Picture> {
-    let image = read_first_flat_layer_from_file(path).map_err(io_error)?;
+/// As [`read`], of `length` bytes.
+#[doc(hidden)]
+pub fn read_picture(mut bytes: impl Read + Seek, length: u64) -> io::Result<Picture> {
+    check_size(&MetaData::read_from_buffered(&mut bytes, false).map_err(io_error)?, length)?;
+    bytes.rewind()?;
+    let reader = reader().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
+    let image = reader.all_attributes().from_buffered(bytes).map_err(io_error)?;
     let mut attributes = image.attributes.other.iter().chain(&image.layer_data.attributes.other);
     let identity = match attributes.find(|(name, _)| Text::eq(name, ATTRIBUTE)) {
         Some((_, AttributeValue::Text(json))) => Some(serde_json::from_str(&json.to_string())?),
         _ => None,
     };
     Ok(Picture { film: film(&image)?, identity })
+}
+
+/// What one byte of a file can become at the most: deflate's best ratio is 1032, and PXR24 leaves one byte of four out before it.
+const MAX_RATIO: u128 = 2048;
+
+/// Refuses a file that cannot hold the pixels that its headers promise: the crate takes memory for all of them before it looks at one.
+fn check_size(file: &MetaData, length: u64) -> io::Result<()> {
+    let bytes = |header: &Header| header.layer_size.0 as u128 * header.layer_size.1 as u128 * header.channels.bytes_per_pixel as u128;
+    match file.headers.iter().find(|header| bytes(header) > MAX_RATIO * u128::from(length)) {
+        Some(Header { layer_size: Vec2(width, height), .. }) => {
+            let message = format!("{width} x {height} pixels cannot be in a file of {length} bytes");
+            Err(io::Error::new(io::ErrorKind::InvalidData, message))
+        }
+        None => Ok(()),
+    }
 }
 
 /// An image of one layer, as the crate reads it.

@@ -40,6 +40,8 @@ pub struct Placer<'a> {
     script_meshes: BTreeMap<AssetId, u32>,
     models: Vec<(&'a Model, Rc<PlacedModel>)>,
     objects: u32,
+    /// Groups that were placed once more.
+    unfolded: u32,
     /// The tables.
     pub materials: Vec<Material>,
     /// See `materials`.
@@ -74,6 +76,7 @@ impl<'a> Placer<'a> {
             script_meshes: BTreeMap::new(),
             models: Vec::new(),
             objects: 0,
+            unfolded: 0,
             materials,
             textures,
             geometry,
@@ -119,6 +122,10 @@ impl<'a> Placer<'a> {
             ObjectKind::Instance { group: inner } => {
                 if *inner >= group {
                     return Err(CompileError::new(object.source, "an instance shows a group that does not stand before its own"));
+                }
+                self.unfolded += 1; // groups of groups without any object take time too
+                if self.unfolded > kind::INDEX {
+                    return Err(too_many(object.source));
                 }
                 if depth == DEEPEST {
                     return Err(CompileError::new(object.source, format!("groups are nested more than {DEEPEST} deep")));
@@ -280,8 +287,7 @@ impl<'a> Placer<'a> {
 
     fn next_object(&mut self, source: SourceId) -> Result<u32> {
         if self.objects == kind::INDEX {
-            let error = CompileError::new(source, format!("the scene has more than {} objects once its groups are unfolded", kind::INDEX));
-            return Err(error.with_help("join objects that never move apart into one mesh"));
+            return Err(too_many(source));
         }
         self.objects += 1;
         Ok(self.objects - 1)
@@ -299,6 +305,11 @@ fn affine(rows: &Matrix) -> DAffine3 {
     let [x, y, z] = rows;
     let columns = DMat3::from_cols(DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]), DVec3::new(x[2], y[2], z[2]));
     DAffine3::from_mat3_translation(columns, DVec3::new(x[3], y[3], z[3]))
+}
+
+fn too_many(source: SourceId) -> CompileError {
+    let error = CompileError::new(source, format!("the scene has more than {} objects once its groups are unfolded", kind::INDEX));
+    error.with_help("join objects that never move apart into one mesh")
 }
 
 fn not_invertible(object: &Object) -> CompileError {

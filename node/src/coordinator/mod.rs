@@ -23,7 +23,8 @@ mod room;
 mod session;
 mod status;
 mod store;
-mod submission;
+#[doc(hidden)]
+pub mod submission;
 
 use std::{net::SocketAddr, path::PathBuf, sync::Arc};
 

@@ -23,6 +23,8 @@ pub use api::FRAME_PARAMETER;
 pub use description::{Frames, JobDescription, Output, PixelType, ScriptBundle};
 pub use load::{LoadedJob, load};
 pub use policy::Policies;
+#[doc(hidden)]
+pub use {fault::Fault, load::load_within, sandbox::Budget};
 
 #[cfg(test)]
 mod tests;

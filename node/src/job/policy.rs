@@ -35,8 +35,14 @@ impl Policies {
     /// # Errors
     /// What the script did wrong, with its place.
     pub fn new(bundle: &ScriptBundle, parameters: &BTreeMap<String, String>) -> Result<Self> {
+        Self::within(bundle, parameters, Budget::default())
+    }
+
+    /// As [`Self::new`], within a budget of one's own.
+    #[doc(hidden)]
+    pub fn within(bundle: &ScriptBundle, parameters: &BTreeMap<String, String>, budget: Budget) -> Result<Self> {
         let Evaluated { sandbox, job } =
-            evaluate_bundle(bundle, parameters, Budget::default()).map_err(|fault| Error { code: ExitCode::Job, ..Error::from(fault) })?;
+            evaluate_bundle(bundle, parameters, budget).map_err(|fault| Error { code: ExitCode::Job, ..Error::from(fault) })?;
         let (split, assign) = (own(&job.split), own(&job.assign));
         Ok(Self { sandbox, split, assign })
     }

@@ -17,7 +17,8 @@ use std::time::Duration;
 use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, TableDefinition};
 
 pub use filter::Filter;
-use segment::Segment;
+#[doc(hidden)]
+pub use segment::Segment;
 
 use crate::error::{Error, ExitCode, Result};
 use crate::farm::{Event, Farm, FarmConfig, JobId, LeaseId};

@@ -15,7 +15,7 @@ const MAGIC: [u8; 4] = *b"TPX1";
 const HEADER_BYTES: usize = 4 + 4 + 8 + 8 + 32;
 
 /// An open segment.
-pub(super) struct Segment {
+pub struct Segment {
     file: File,
     /// Length of all whole records.
     end: u64,

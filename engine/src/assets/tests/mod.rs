@@ -12,7 +12,7 @@ use std::io::Cursor;
 
 use glam::DVec3;
 
-use super::{AssetError, LoadedModel, load};
+use super::{AssetError, LoadedModel, check_promises, load};
 use crate::description::{MemoryAssets, Model, ModelFormat};
 
 /// Loads a model whose parts are given by name.
@@ -44,30 +44,6 @@ fn triangles(model: &LoadedModel) -> Vec<[[f64; 3]; 3]> {
     }
     triangles.sort_by(|a, b| a.partial_cmp(b).unwrap());
     triangles
-}
-
-/// What every model that was read promises, whatever its file was.
-fn check_promises(model: &LoadedModel) {
-    for instance in &model.instances {
-        assert!(instance.mesh < model.meshes.len() && instance.transform.is_finite() && instance.transform.matrix3.determinant() != 0.0);
-    }
-    for mesh in &model.meshes {
-        let count = mesh.positions.len();
-        assert!(mesh.triangles.as_flattened().iter().all(|&index| (index as usize) < count));
-        assert!(mesh.positions.as_flattened().iter().all(|x| x.is_finite()));
-        assert!(mesh.normals.is_empty() || mesh.normals.len() == count);
-        for normal in &mesh.normals {
-            let length = normal.iter().map(|x| x * x).sum::<f32>().sqrt();
-            assert!((length - 1.0).abs() < 1e-6, "{normal:?}");
-        }
-        assert!(mesh.uvs.is_empty() || mesh.uvs.len() == count);
-        assert!(mesh.uvs.as_flattened().iter().all(|x| x.is_finite()));
-        assert!(mesh.colors.is_empty() || mesh.colors.len() == count);
-        assert!(mesh.colors.as_flattened().iter().all(|x| (0.0..=1.0).contains(x)));
-        let material = &model.materials[mesh.material];
-        assert!(material.base_color.iter().all(|x| (0.0..=1.0).contains(x)));
-        assert!(material.texture.is_none_or(|texture| texture < model.textures.len() && mesh.uvs.len() == count));
-    }
 }
 
 /// A PNG of 2 x 2 pixels: red, green, blue, and white that is half transparent.

@@ -34,7 +34,8 @@ impl Clone for Identity {
 }
 
 impl Identity {
-    pub(in crate::wire) fn parse(pem: &str) -> Result<Self, String> {
+    #[doc(hidden)]
+    pub fn parse(pem: &str) -> Result<Self, String> {
         let chain: Result<Vec<_>, _> = CertificateDer::pem_slice_iter(pem.as_bytes()).collect();
         let chain = chain.map_err(|error| error.to_string())?;
         if chain.len() < 2 {

@@ -58,6 +58,14 @@ impl Revocations {
             Ok(metadata) if metadata.len() > REVOCATION_BYTES => return Err(format!("{}: too long", path.display())),
             Ok(_) => fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?,
         };
+        Self::parse(path, &text)
+    }
+
+    /// Reads the text of a list; `path` is for messages.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn parse(path: &Path, text: &str) -> Result<Self, String> {
         let mut list = Self::default();
         for (number, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
             let entry = serde_json::from_str(line).map_err(|error| format!("{}:{}: {error}", path.display(), number + 1))?;

@@ -1,0 +1,14 @@
+//! Pictures that are read back to be verified.
+
+use std::io::Cursor;
+
+use tessera_engine::output::exr;
+
+/// An OpenEXR file.
+pub fn exr(bytes: &[u8]) -> bool {
+    let Ok(picture) = exr::read_picture(Cursor::new(bytes), bytes.len() as u64) else { return false };
+    let film = &picture.film;
+    assert_eq!(film.pixels().len() as u64, u64::from(film.width()) * u64::from(film.height()));
+    film.hash();
+    true
+}
