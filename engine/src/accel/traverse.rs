@@ -27,6 +27,9 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     mut limit: f32,
     mut leaf: impl FnMut(u32) -> ControlFlow<(), f32>,
 ) {
+    if !ray.is_sound() {
+        return;
+    }
     // SAFETY: by this function's own conditions.
     unsafe {
         let lanes = |v: [f32; 4]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];

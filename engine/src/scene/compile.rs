@@ -1,6 +1,10 @@
 //! From a description and its assets to a scene.
 
-use super::{Scene, Statistics, error::CompileError, place::Placer};
+use super::{
+    Scene, Statistics,
+    error::CompileError,
+    place::{FARTHEST, Placer},
+};
 use crate::{
     camera::Camera,
     description::{self, AssetSource, Falloff, Frame, Render, SourceId},
@@ -23,6 +27,9 @@ impl Scene {
         let whole = SourceId::default();
         check_film(frame)?;
         let camera = Camera::compile(&frame.camera, &frame.film).map_err(|message| CompileError::new(whole, message))?;
+        if camera.eye().abs().max_element() > FARTHEST {
+            return Err(CompileError::new(whole, format!("the camera stands farther than {FARTHEST:e} from the middle of the world")));
+        }
         let lights = frame.scene.lights.iter().map(light).collect::<Result<Vec<_>>>()?;
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let materials =
@@ -76,6 +83,9 @@ fn light(light: &description::Light) -> Result<Light> {
     };
     if !place.iter().all(|x| x.is_finite()) {
         return Err(CompileError::new(source, "the light's position or direction is not finite"));
+    }
+    if place.iter().any(|x| x.abs() > FARTHEST) {
+        return Err(CompileError::new(source, format!("the light's position or direction is farther than {FARTHEST:e}")));
     }
     if !is_color(strength) {
         return Err(CompileError::new(source, "the light's colour must be finite and not negative"));

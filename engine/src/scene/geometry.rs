@@ -128,7 +128,8 @@ impl Geometry {
 }
 
 impl LocalShape {
-    fn bounds(&self) -> Bounds {
+    /// The box around it.
+    pub fn bounds(&self) -> Bounds {
         match self {
             Self::Sphere(shape) => shape.bounds(),
             Self::Cuboid(shape) => shape.bounds(),
@@ -150,6 +151,11 @@ impl Transform {
     /// The box around the image of a box.
     pub fn bounds(&self, bounds: Bounds) -> Bounds {
         Bounds::of(bounds.corners().map(|corner| self.to_world.transform_point3(corner)))
+    }
+
+    /// A bound on the coordinates of the image of a box.
+    pub fn reach(&self, bounds: Bounds) -> f64 {
+        self.growth_to_world * max_abs(bounds.min).max(max_abs(bounds.max)) + max_abs(self.to_world.translation)
     }
 
     /// A unit normal in the world (by the inverse transpose).

@@ -15,11 +15,14 @@ use crate::{
     light::Light,
     material::Material,
     math::max_abs,
-    shape::{Cuboid, Disc, Plane, Sphere},
+    shape::{Bounds, Cuboid, Disc, Plane, Sphere},
     texture::Texture,
 };
 
 type Result<T> = std::result::Result<T, CompileError>;
+
+/// Largest coordinate of anything that is placed: squares of distances, and products of these, stay numbers.
+pub(super) const FARTHEST: f64 = 1e75;
 
 /// Deepest nesting of groups.
 const DEEPEST: usize = 64;
@@ -40,8 +43,8 @@ pub struct Placer<'a> {
     script_meshes: BTreeMap<AssetId, u32>,
     models: Vec<(&'a Model, Rc<PlacedModel>)>,
     objects: u32,
-    /// Groups that were placed once more.
-    unfolded: u32,
+    /// Objects of each group and of those within it: groups of groups come to more than time allows before memory ends.
+    unfolded: Vec<u64>,
     /// The tables.
     pub materials: Vec<Material>,
     /// See `materials`.
@@ -76,7 +79,7 @@ impl<'a> Placer<'a> {
             script_meshes: BTreeMap::new(),
             models: Vec::new(),
             objects: 0,
-            unfolded: 0,
+            unfolded: unfolded(scene),
             materials,
             textures,
             geometry,
@@ -123,14 +126,14 @@ impl<'a> Placer<'a> {
                 if *inner >= group {
                     return Err(CompileError::new(object.source, "an instance shows a group that does not stand before its own"));
                 }
-                self.unfolded += 1; // groups of groups without any object take time too
-                if self.unfolded > kind::INDEX {
-                    return Err(too_many(object.source));
-                }
                 if depth == DEEPEST {
                     return Err(CompileError::new(object.source, format!("groups are nested more than {DEEPEST} deep")));
                 }
-                self.group(*inner, transform.to_world, depth + 1)
+                match self.unfolded[*inner as usize] {
+                    0 => Ok(()),
+                    count if count > u64::from(kind::INDEX) => Err(too_many(object.source)),
+                    _ => self.group(*inner, transform.to_world, depth + 1),
+                }
             }
         }
     }
@@ -152,6 +155,7 @@ impl<'a> Placer<'a> {
             }
             Shape::Plane { point, normal } => {
                 let point = finite(point, "the plane's point", source)?;
+                check_reach(transform.reach(Bounds::of([point])), source)?;
                 let plane = Plane::new(point, unit(normal, "the plane's normal", source)?);
                 let object = self.next_object(source)?;
                 let shape = if transform.to_world == DAffine3::IDENTITY {
@@ -194,6 +198,7 @@ impl<'a> Placer<'a> {
     /// A finite shape: moved and scaled evenly it stays what it is, else it keeps its transform.
     fn solid(&mut self, shape: LocalShape, material: u32, transform: Transform, source: SourceId) -> Result<()> {
         let object = self.next_object(source)?;
+        check_reach(transform.reach(shape.bounds()), source)?;
         let DAffine3 { matrix3, translation } = transform.to_world;
         let scale = matrix3.x_axis.x;
         let geometry = &mut self.geometry;
@@ -218,6 +223,7 @@ impl<'a> Placer<'a> {
 
     fn instance(&mut self, mesh: u32, material: u32, transform: Transform, source: SourceId) -> Result<()> {
         let object = self.next_object(source)?;
+        check_reach(transform.reach(self.geometry.meshes[mesh as usize].tree.bounds()), source)?;
         let surface = &self.materials[material as usize];
         let masked = surface.is_masked() || !surface.double_sided;
         self.geometry.instances.push(Placed { shape: Instance { mesh, transform, masked }, object, material });
@@ -301,6 +307,19 @@ impl<'a> Placer<'a> {
     }
 }
 
+/// How many objects each group comes to, without those that stand in files.
+fn unfolded(scene: &description::Scene) -> Vec<u64> {
+    let mut counts: Vec<u64> = Vec::with_capacity(scene.groups.len());
+    for group in &scene.groups {
+        let count = |object: &Object| match object.kind {
+            ObjectKind::Instance { group } => counts.get(group as usize).copied().unwrap_or(0),
+            _ => 1,
+        };
+        counts.push(group.objects.iter().map(count).fold(0, u64::saturating_add));
+    }
+    counts
+}
+
 fn affine(rows: &Matrix) -> DAffine3 {
     let [x, y, z] = rows;
     let columns = DMat3::from_cols(DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]), DVec3::new(x[2], y[2], z[2]));
@@ -317,6 +336,14 @@ fn not_invertible(object: &Object) -> CompileError {
     let what =
         if finite { "the object's transform cannot be inverted: it flattens the object" } else { "the object's transform is not finite" };
     CompileError::new(object.source, what).with_help("check for a scale of 0, or for a division by 0")
+}
+
+/// Negated, so that what is no number is refused too.
+fn check_reach(reach: f64, source: SourceId) -> Result<()> {
+    if !(reach <= FARTHEST) {
+        return Err(CompileError::new(source, format!("the object reaches farther than {FARTHEST:e} from the middle of the world")));
+    }
+    Ok(())
 }
 
 fn finite(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {

@@ -5,7 +5,10 @@ use std::time::Duration;
 use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
-    limits::{ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, PIXELS_PER_FRAME, PRIORITY},
+    limits::{
+        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY, SAMPLES_PER_PIXEL,
+    },
+    schedule::{Probe, Split},
     wire::{self, Terms},
 };
 
@@ -14,7 +17,66 @@ use crate::{
 /// # Errors
 /// In words.
 pub fn check(description: &JobDescription, terms: &Terms) -> Result<(), String> {
-    let Output { exr, png, manifest, .. } = &description.output;
+    check_terms(terms)?;
+    outputs(&description.output)?;
+    if description.assets.len() > ASSETS_PER_JOB {
+        return Err(format!("{} assets; {ASSETS_PER_JOB} are allowed", description.assets.len()));
+    }
+    let film = &description.frame.film;
+    let pixels = u64::from(film.width) * u64::from(film.height);
+    if pixels == 0 || pixels > PIXELS_PER_FRAME {
+        return Err(format!("a frame of {} x {} pixels; 1 to {PIXELS_PER_FRAME} pixels are allowed", film.width, film.height));
+    }
+    let samples = description.frame.quality.samples;
+    if !(1..=SAMPLES_PER_PIXEL).contains(&samples) {
+        return Err(format!("{samples} samples a pixel; 1 to {SAMPLES_PER_PIXEL} are allowed"));
+    }
+    if !(0.0..=1.0).contains(&description.audit) {
+        return Err(format!("a share of {} of the parts to compare; 0 to 1 is allowed", description.audit));
+    }
+    if !(1..=MOST_ATTEMPTS_PER_PART).contains(&description.attempts) {
+        return Err(format!("{} attempts at a part; 1 to {MOST_ATTEMPTS_PER_PART} are allowed", description.attempts));
+    }
+    if !description.patience.is_none_or(|seconds| (0.0..=LONGEST_PATIENCE).contains(&seconds)) {
+        return Err(format!("a patience of {:?} s; 0 to {LONGEST_PATIENCE} is allowed", description.patience));
+    }
+    probe(&description.probe)?;
+    split(&description.split, film.width, film.height)
+}
+
+fn check_terms(terms: &Terms) -> Result<(), String> {
+    check_priority(terms.priority)?;
+    if terms.after.len() > JOBS_AWAITED {
+        return Err(format!("it waits for {} jobs; {JOBS_AWAITED} are allowed", terms.after.len()));
+    }
+    Ok(())
+}
+
+fn probe(probe: &Probe) -> Result<(), String> {
+    match probe {
+        Probe::EveryNode { scale } | Probe::Shared { scale } if !(*scale > 0.0 && *scale <= 1.0) => {
+            Err(format!("a probe at {scale} of the resolution; above 0 and up to 1 is allowed"))
+        }
+        Probe::Known { costs, .. } if !costs.is_sound() => Err("the probe's costs are no costs".to_owned()),
+        _ => Ok(()),
+    }
+}
+
+fn split(split: &Split, width: u32, height: u32) -> Result<(), String> {
+    let parts = match *split {
+        Split::Grid { width: 0, .. } | Split::Grid { height: 0, .. } | Split::Strips { count: 0 } => 0,
+        Split::Grid { width: columns, height: rows } => u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows)),
+        Split::Strips { count } => u64::from(count.min(height)),
+        Split::Script => 1,
+    };
+    match parts {
+        1.. if parts <= PARTS_PER_JOB as u64 => Ok(()),
+        _ => Err(format!("a split into {parts} parts; 1 to {PARTS_PER_JOB} are allowed")),
+    }
+}
+
+fn outputs(output: &Output) -> Result<(), String> {
+    let Output { exr, png, manifest, .. } = output;
     let names: Vec<&String> = [exr, manifest].into_iter().chain(png).collect();
     for (i, name) in names.iter().enumerate() {
         if !wire::is_plain_name(name) {
@@ -23,21 +85,6 @@ pub fn check(description: &JobDescription, terms: &Terms) -> Result<(), String> 
         if names[..i].contains(name) {
             return Err(format!("two outputs are named {name:?}"));
         }
-    }
-    if description.assets.len() > ASSETS_PER_JOB {
-        return Err(format!("{} assets; {ASSETS_PER_JOB} are allowed", description.assets.len()));
-    }
-    if !(1..=MOST_ATTEMPTS_PER_PART).contains(&description.attempts) || !description.patience.is_none_or(|seconds| seconds >= 0.0) {
-        return Err("attempts and patience are out of range".to_owned());
-    }
-    check_priority(terms.priority)?;
-    if terms.after.len() > JOBS_AWAITED {
-        return Err(format!("it waits for {} jobs; {JOBS_AWAITED} are allowed", terms.after.len()));
-    }
-    let film = &description.frame.film;
-    let pixels = u64::from(film.width) * u64::from(film.height);
-    if pixels == 0 || pixels > PIXELS_PER_FRAME {
-        return Err(format!("a frame of {} x {} pixels; 1 to {PIXELS_PER_FRAME} pixels are allowed", film.width, film.height));
     }
     Ok(())
 }
@@ -68,5 +115,30 @@ pub fn spec(description: &JobDescription, terms: &Terms, owner: &str) -> JobSpec
         after: terms.after.clone(),
         attempts: *attempts,
         patience: patience.map(|seconds| Duration::from_secs_f64(seconds.clamp(0.0, LONGEST_PATIENCE))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::schedule::CostMap;
+
+    #[test]
+    fn what_would_spoil_the_core_is_refused() {
+        for scale in [f64::NAN, 0.0, -1.0, 2.0, f64::INFINITY] {
+            assert!(probe(&Probe::Shared { scale }).is_err(), "{scale}");
+        }
+        assert!(probe(&Probe::EveryNode { scale: 1.0 }).is_ok());
+        let costs = |cost| CostMap { cell: 8, columns: 1, rows: 1, seconds_per_pixel: vec![cost] };
+        assert!(probe(&Probe::Known { costs: costs(1.0), powers: Default::default() }).is_ok());
+        assert!(probe(&Probe::Known { costs: costs(f64::NAN), powers: Default::default() }).is_err());
+        for (wrong, what) in [
+            (Split::Grid { width: 1, height: 1 }, "1073741824 parts"),
+            (Split::Grid { width: 8, height: 0 }, "0 parts"),
+            (Split::Strips { count: 0 }, "0 parts"),
+        ] {
+            assert!(split(&wrong, 32_768, 32_768).is_err_and(|message| message.contains(what)), "{wrong:?}");
+        }
+        assert!(split(&Split::Grid { width: 64, height: 64 }, 1024, 768).is_ok());
     }
 }

@@ -11,6 +11,7 @@ mod segment;
 
 use std::collections::BTreeMap;
 use std::io;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
@@ -61,6 +62,14 @@ impl Journal {
     ///
     /// A long journal is shortened.
     pub fn open(folder: &Path, config: FarmConfig) -> Result<(Self, Recovered)> {
+        // redb believes what stands in its file, and panics where a disk has changed that.
+        catch_unwind(AssertUnwindSafe(|| Self::open_believed(folder, config))).unwrap_or_else(|_| {
+            Err(failed(&folder.join("events.redb"), "read the journal", "it is damaged")
+                .with_help("move the file away: jobs that were running have to be submitted again"))
+        })
+    }
+
+    fn open_believed(folder: &Path, config: FarmConfig) -> Result<(Self, Recovered)> {
         std::fs::create_dir_all(folder).map_err(|error| failed(folder, "make the folder", &error))?;
         let path = folder.join("events.redb");
         let database = Database::create(&path).map_err(|error| match error {

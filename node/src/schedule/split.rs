@@ -38,10 +38,10 @@ pub fn cost_of(rect: Rect, costs: &CostMap) -> f64 {
 
 /// Cells along one axis that `from .. from + length` meets, with the pixels it has in each. Pixels beyond the last cell belong to that.
 fn spans(from: u32, length: u32, cell: u32, cells: u32) -> impl Iterator<Item = (u32, u32)> + Clone {
-    let (cell, last, end) = (cell.max(1), cells.saturating_sub(1), from + length);
+    let (cell, last, end) = (cell.max(1), cells.saturating_sub(1), from.saturating_add(length));
     let index = move |at: u32| (at / cell).min(last);
     (index(from)..=index(end.saturating_sub(1))).map(move |i| {
-        let upper = if i == last { end } else { end.min((i + 1) * cell) };
+        let upper = if i == last { end } else { end.min((i + 1).saturating_mul(cell)) };
         (i, upper.saturating_sub(from.max(i * cell)))
     })
 }

@@ -55,6 +55,17 @@ pub struct CostMap {
     pub seconds_per_pixel: Vec<f64>,
 }
 
+impl CostMap {
+    /// Whether it tells a cost of every cell, and has any.
+    pub fn is_sound(&self) -> bool {
+        let cells = u64::from(self.columns) * u64::from(self.rows);
+        self.cell > 0
+            && cells > 0
+            && cells == self.seconds_per_pixel.len() as u64
+            && self.seconds_per_pixel.iter().all(|cost| cost.is_finite() && *cost >= 0.0)
+    }
+}
+
 /// How costs and powers are learned before rendering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Probe {

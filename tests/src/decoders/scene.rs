@@ -28,7 +28,8 @@ pub fn frame(bytes: &[u8]) -> bool {
 /// A mesh that a script made, before the camera.
 pub fn mesh(bytes: &[u8]) -> bool {
     let data = AssetId::of(bytes);
-    let object = Object { kind: ObjectKind::Shape { shape: Shape::Mesh { data }, material: 0 }, transform: None, source: SourceId::default() };
+    let object =
+        Object { kind: ObjectKind::Shape { shape: Shape::Mesh { data }, material: 0 }, transform: None, source: SourceId::default() };
     let mut frame = s1::frame(8, 6);
     frame.scene.groups = vec![Group { objects: vec![object] }];
     frame.scene.root = 0;

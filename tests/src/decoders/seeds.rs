@@ -6,8 +6,8 @@ use std::{collections::BTreeMap, fs, time::Duration};
 use serde::Serialize;
 use tessera_engine::{
     description::{
-        AssetId, Camera, ColorSpace, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData, Object, ObjectKind, Quality,
-        Render, Scene, Shape, SourceId, Texture, Wrap,
+        AssetId, Camera, ColorSpace, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData, Object, ObjectKind,
+        Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     film,
     output::exr,
@@ -19,8 +19,8 @@ use tessera_node::{
     journal::Segment,
     schedule::{Assign, CostMap, NodeId, PartId, Probe, Split},
     wire::{
-        self, FileHeader, FromNode, Heartbeat, Hello, JobState, JobStatus, JoinRequest, JoinResponse, KeptJob, NewKey, NodeStatus, NodeStream,
-        PartHeader, Request, Response, Status, ToNode,
+        self, FileHeader, FromNode, Heartbeat, Hello, JobState, JobStatus, JoinRequest, JoinResponse, KeptJob, NewKey, NodeStatus,
+        NodeStream, PartHeader, Request, Response, Status, ToNode,
         tls::{Authority, Role},
     },
 };

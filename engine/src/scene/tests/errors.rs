@@ -80,6 +80,25 @@ fn groups_that_show_themselves_are_refused() {
     assert_eq!(message_of(cycle), "an instance shows a group that does not stand before its own");
 }
 
+/// Forty groups, each of which shows the one before it twice, come to 2^40 times the first.
+#[test]
+fn groups_that_multiply_beyond_all_bounds_are_refused_before_they_are_unfolded() {
+    let doubled = |first: Vec<Object>| {
+        let mut frame = frame(vec![]);
+        frame.scene.groups = vec![Group { objects: first }];
+        for group in 0..40 {
+            let twice = Object { kind: ObjectKind::Instance { group }, source: HERE, ..sphere(DVec3::ZERO, 1.0, 0) };
+            frame.scene.groups.push(Group { objects: vec![twice.clone(), twice] });
+        }
+        frame.scene.root = 40;
+        Scene::compile(&frame, &MemoryAssets::default()).map(|scene| scene.bounds())
+    };
+    let error = doubled(vec![sphere(DVec3::ZERO, 1.0, 0)]).unwrap_err();
+    assert!(error.message.contains("objects once its groups are unfolded"), "{error}");
+    assert_eq!(error.source, HERE);
+    assert_eq!(doubled(vec![]).unwrap(), None);
+}
+
 #[test]
 fn films_and_cameras_are_checked() {
     let mut empty = frame(vec![]);

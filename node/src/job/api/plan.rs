@@ -64,9 +64,7 @@ fn known(field: &Field, name: &str) -> mlua::Result<Probe> {
     let Manifest { probe, nodes, .. } =
         manifest::parse(name, &String::from_utf8_lossy(&bytes)).map_err(|error| keys.fault(error.message))?;
     let costs = CostMap { cell: probe.cell, columns: probe.columns, rows: probe.rows, seconds_per_pixel: probe.seconds_per_pixel };
-    let cells = u64::from(costs.columns) * u64::from(costs.rows);
-    let sound = costs.cell > 0 && cells > 0 && cells == costs.seconds_per_pixel.len() as u64;
-    if !sound || !costs.seconds_per_pixel.iter().all(|cost| cost.is_finite() && *cost >= 0.0) {
+    if !costs.is_sound() {
         return Err(keys.fault(format!("{name} tells no costs")).into());
     }
     let powers = nodes.into_iter().filter(|node| node.power > 0.0 && node.power.is_finite()).map(|node| (node.name, node.power));
