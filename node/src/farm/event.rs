@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
 use super::{Incarnation, JobId, LeaseId, PolicyId};
+use crate::limits::ATTEMPTS_PER_PART;
 use crate::schedule::{Assign, NodeId, PartId, Plan, Probe, Split};
 
 /// What the core needs to know of a job; the picture itself is not its business.
@@ -39,6 +40,28 @@ pub struct JobSpec {
     pub attempts: u32,
     /// How long it waits for a node when there is none; `None` for the farm's own patience.
     pub patience: Option<Duration>,
+}
+
+impl JobSpec {
+    /// A job that asks for nothing in particular.
+    pub fn plain(name: &str, width: u32, height: u32, samples: u64) -> Self {
+        Self {
+            name: name.to_owned(),
+            width,
+            height,
+            samples,
+            probe: Probe::Shared { scale: 1.0 / 16.0 },
+            split: Split::Grid { width: 64, height: 64 },
+            assign: Assign::EarliestFinish,
+            min_nodes: 1,
+            audit: 0.0,
+            owner: "someone".to_owned(),
+            priority: 0,
+            after: Vec::new(),
+            attempts: ATTEMPTS_PER_PART,
+            patience: None,
+        }
+    }
 }
 
 /// What a program computes with: nodes of one build give the same pixels.

@@ -286,6 +286,14 @@ impl Journal {
     }
 }
 
+impl Drop for Journal {
+    /// A damaged database that could be opened may still panic when it is closed.
+    fn drop(&mut self) {
+        let database = self.database.take();
+        let _ = catch_unwind(AssertUnwindSafe(|| drop(database)));
+    }
+}
+
 fn put(
     database: &Database,
     first: u64,

@@ -7,20 +7,11 @@ const BUILD: Build = Build { revision: 1, canary: [7; 32] };
 fn spec() -> JobSpec {
     let costs = CostMap { cell: 64, columns: 1, rows: 1, seconds_per_pixel: vec![1.0] };
     JobSpec {
-        name: "journaled".into(),
-        width: 64,
-        height: 64,
-        samples: 1,
         probe: Probe::Known { costs, powers: BTreeMap::new() },
         split: Split::Grid { width: 16, height: 16 },
         assign: Assign::EarliestFinish,
         min_nodes: 1,
-        audit: 0.0,
-        owner: "someone".into(),
-        priority: 0,
-        after: Vec::new(),
-        attempts: 3,
-        patience: None,
+        ..JobSpec::plain("journaled", 64, 64, 1)
     }
 }
 

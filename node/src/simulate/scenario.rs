@@ -6,7 +6,6 @@ use tessera_engine::part::Rect;
 
 use super::random::{Random, mix};
 use crate::farm::{FarmConfig, JobId, JobSpec};
-use crate::limits::ATTEMPTS_PER_PART;
 use crate::schedule::{Assign, Probe, Split};
 
 /// A machine that runs a node.
@@ -153,22 +152,7 @@ impl Scenario {
             machines: machines.iter().map(machine).collect(),
             network: Network { delay: (0.0002, 0.001), loss: 0.0, duplication: 0.0 },
             faults: Vec::new(),
-            job: JobSpec {
-                name: "simulated".into(),
-                width: 1024,
-                height: 768,
-                samples: 4,
-                probe: Probe::Shared { scale: 1.0 / 16.0 },
-                split,
-                assign,
-                min_nodes: machines.len() as u32,
-                audit: 0.0,
-                owner: "one".into(),
-                priority: 0,
-                after: Vec::new(),
-                attempts: ATTEMPTS_PER_PART,
-                patience: None,
-            },
+            job: JobSpec { split, assign, min_nodes: machines.len() as u32, ..JobSpec::plain("simulated", 1024, 768, 4) },
             others: Vec::new(),
             poison: None,
             policy: ScriptPolicy::Good,

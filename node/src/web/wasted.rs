@@ -78,24 +78,9 @@ mod tests {
     }
 
     fn empty() -> JobRecord {
-        use crate::{farm, schedule};
+        use crate::farm;
         let mut farm = farm::Farm::new(farm::FarmConfig::default());
-        let spec = farm::JobSpec {
-            name: "empty".into(),
-            width: 8,
-            height: 8,
-            samples: 1,
-            probe: schedule::Probe::Shared { scale: 0.5 },
-            split: schedule::Split::Strips { count: 1 },
-            assign: schedule::Assign::Naive,
-            min_nodes: 1,
-            audit: 0.0,
-            owner: "someone".into(),
-            priority: 0,
-            after: Vec::new(),
-            attempts: 3,
-            patience: None,
-        };
+        let spec = farm::JobSpec::plain("empty", 8, 8, 1);
         farm.step(std::time::Duration::ZERO, farm::Event::JobSubmitted { job: farm::JobId(1), spec });
         farm.record(farm::JobId(1)).unwrap()
     }

@@ -30,15 +30,9 @@ pub fn segment(bytes: &[u8]) -> bool {
 /// A job as a submission may tell of it.
 pub fn spec() -> JobSpec {
     JobSpec {
-        name: "job".into(),
-        width: 64,
-        height: 48,
-        samples: 4,
         probe: Probe::Shared { scale: 0.25 },
         split: Split::Grid { width: 32, height: 32 },
-        assign: Assign::EarliestFinish,
-        min_nodes: 1,
-        audit: 0.0,
+        ..JobSpec::plain("job", 64, 48, 4)
     }
 }
 

@@ -7,7 +7,7 @@ use tessera_node::{
     job::{Budget, JobDescription, Policies, load_within},
     limits::{PIXELS_PER_FRAME, REQUEST_BYTES},
     schedule::{CostMap, NodeId, NodePower, Part, PartId, assign, split},
-    wire,
+    wire::{self, Terms},
 };
 
 use super::{model::PNG, scene::OBJ, wire::message};
@@ -28,7 +28,7 @@ pub fn job(bytes: &[u8]) -> bool {
     message::<JobDescription>(&wire::encode(&description, REQUEST_BYTES).unwrap()[4..]).expect("a description travels");
     let pixels = u64::from(description.frame.film.width) * u64::from(description.frame.film.height);
     if pixels <= PIXELS_PER_FRAME {
-        submission::check(&description).unwrap_or_else(|wrong| panic!("what was described is refused: {wrong}"));
+        submission::check(&description, &Terms::default()).unwrap_or_else(|wrong| panic!("what was described is refused: {wrong}"));
     }
     ask(&description);
     true

@@ -14,13 +14,13 @@ use tessera_engine::{
     part::{Counters, Rect, RenderedPart, SampleRange},
 };
 use tessera_node::{
-    farm::{Answer, Event, Incarnation, JobId, LeaseId, NodeInfo, NodeState, PolicyId},
+    farm::{Answer, Build, Event, Incarnation, JobId, LeaseId, NodeInfo, NodeState, PolicyId},
     job::{JobDescription, Output, PixelType, ScriptBundle},
     journal::Segment,
     schedule::{Assign, CostMap, NodeId, PartId, Probe, Split},
     wire::{
         self, FileHeader, FromNode, Heartbeat, Hello, JobState, JobStatus, JoinRequest, JoinResponse, KeptJob, NewKey, NodeStatus,
-        NodeStream, PartHeader, Request, Response, Status, ToNode,
+        NodeStream, PartHeader, Place, Request, Response, Status, Terms, ToNode,
         tls::{Authority, Role},
     },
 };
@@ -38,6 +38,7 @@ const JOB: JobId = JobId(3);
 const LEASE: LeaseId = LeaseId(400);
 const NODE: NodeId = NodeId(1);
 const LIFE: Incarnation = Incarnation(77);
+const BUILD: Build = Build { revision: 1, canary: [9; 32] };
 const RECT: Rect = Rect { x: 32, y: 0, width: 32, height: 16 };
 
 /// All seeds that follow from the program: another coding makes others.
@@ -140,6 +141,9 @@ fn coordinator_says(seeds: &mut Vec<Seed>) {
     let job = JobStatus {
         job: JOB,
         name: "job".into(),
+        owner: "ann".into(),
+        priority: -5,
+        paused: true,
         state: JobState::Failed("no luck".into()),
         parts: 9,
         committed: 4,
@@ -164,7 +168,9 @@ fn coordinator_says(seeds: &mut Vec<Seed>) {
 
 fn clients_say(seeds: &mut Vec<Seed>) {
     let requests = [
-        Request::Submit { description: Box::new(description()), min_nodes: 2 },
+        Request::Submit { description: Box::new(description()), terms: Terms { min_nodes: 2, priority: -5, after: vec![JOB] } },
+        Request::Move { job: JOB, place: Place::Ranked(10) },
+        Request::Move { job: JOB, place: Place::Paused },
         Request::Watch { job: JOB },
         Request::Release { node: "attic".into() },
     ];
@@ -185,6 +191,8 @@ fn description() -> JobDescription {
         split: Split::Strips { count: 3 },
         assign: Assign::Script,
         audit: 0.125,
+        attempts: 5,
+        patience: Some(600.0),
         output: Output {
             exr: "job.exr".into(),
             png: Some("job.png".into()),
@@ -284,8 +292,9 @@ fn events(further: &[Event]) -> Vec<u8> {
     let (node, incarnation, job) = (NODE, LIFE, JOB);
     let info = NodeInfo { name: "attic".into(), lanes: 2, build: "0.1.0".into(), address: "127.0.0.1:5".into() };
     let told = [
+        Event::Restarted { build: BUILD },
         Event::NodeJoined { node, incarnation, info },
-        Event::NodeProved { node, incarnation, verdict: Ok(()) },
+        Event::NodeProved { node, incarnation, canary: BUILD.canary },
         Event::JobSubmitted { job, spec: journal::spec() },
         Event::Prepared { node, incarnation, job, result: Ok(()) },
         Event::Probed { node, incarnation, job, cells: (0..12).map(|cell| (cell, 1e-6)).collect() },

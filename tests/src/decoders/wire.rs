@@ -81,10 +81,10 @@ pub fn part(bytes: &[u8]) -> bool {
 /// What clients ask for. A job that is accepted can be told to the farm's core, and its scene be compiled or refused.
 pub fn request(bytes: &[u8]) -> bool {
     let request = message::<Request>(bytes);
-    if let Some(Request::Submit { description, min_nodes }) = &request
-        && submission::check(description).is_ok()
+    if let Some(Request::Submit { description, terms }) = &request
+        && submission::check(description, terms).is_ok()
     {
-        let spec = submission::spec(description, *min_nodes);
+        let spec = submission::spec(description, terms, "someone");
         assert!(spec.min_nodes > 0 && spec.width > 0 && spec.height > 0);
         super::scene::compiles(&description.frame);
     }

@@ -103,20 +103,11 @@ impl Bench {
 fn spec(assign: Assign, min_nodes: u32) -> JobSpec {
     let costs = CostMap { cell: 64, columns: 1, rows: 1, seconds_per_pixel: vec![0.01] };
     JobSpec {
-        name: "bench".into(),
-        width: 64,
-        height: 64,
-        samples: 4,
         probe: Probe::Known { costs, powers: BTreeMap::new() },
         split: Split::Grid { width: 16, height: 16 },
         assign,
         min_nodes,
-        audit: 0.0,
-        owner: "someone".into(),
-        priority: 0,
-        after: Vec::new(),
-        attempts: 3,
-        patience: None,
+        ..JobSpec::plain("bench", 64, 64, 4)
     }
 }
 
