@@ -338,9 +338,8 @@ fn not_invertible(object: &Object) -> CompileError {
     CompileError::new(object.source, what).with_help("check for a scale of 0, or for a division by 0")
 }
 
-/// Negated, so that what is no number is refused too.
 fn check_reach(reach: f64, source: SourceId) -> Result<()> {
-    if !(reach <= FARTHEST) {
+    if reach.is_nan() || reach > FARTHEST {
         return Err(CompileError::new(source, format!("the object reaches farther than {FARTHEST:e} from the middle of the world")));
     }
     Ok(())

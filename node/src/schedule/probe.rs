@@ -30,7 +30,7 @@ pub struct Cells {
 /// too many cells.
 pub fn cells(width: u32, height: u32, scale: f64) -> Cells {
     let longest = width.max(height).max(1);
-    let stride = (1.0 / scale).round().max(1.0).min(f64::from(longest)) as u32; // 1 where `scale` is no number
+    let stride = if scale.is_nan() { 1 } else { (1.0 / scale).round().clamp(1.0, f64::from(longest)) as u32 };
     let mut cell = stride.saturating_mul(POINTS_PER_EDGE);
     while u64::from(width.div_ceil(cell)) * u64::from(height.div_ceil(cell)) > PROBE_CELLS {
         cell = cell.saturating_mul(2);
