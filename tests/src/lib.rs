@@ -6,4 +6,5 @@ pub mod decoders;
 pub mod farm;
 pub mod relay;
 pub mod rig;
+pub mod load;
 pub mod s1;
