@@ -73,8 +73,20 @@ impl Film {
 
     /// BLAKE3 of the pixels: little-endian f32, red, green, blue, row by row from the top.
     pub fn hash(&self) -> [u8; 32] {
-        let bytes: Vec<u8> = self.pixels.iter().flatten().flat_map(|component| component.to_le_bytes()).collect();
-        *blake3::hash(&bytes).as_bytes()
+        let mut hasher = blake3::Hasher::new();
+        self.pixels.chunks(self.width.max(1) as usize).for_each(|row| hash_row(&mut hasher, row));
+        *hasher.finalize().as_bytes()
+    }
+}
+
+/// Adds a row to a hash of pixels.
+pub(crate) fn hash_row(hasher: &mut blake3::Hasher, row: &[[f32; 3]]) {
+    // A few pixels at a time: as many bytes as lie on the stack.
+    for pixels in row.chunks(256) {
+        let mut bytes = [0; 256 * 12];
+        let (places, _) = bytes.as_chunks_mut::<4>();
+        places.iter_mut().zip(pixels.iter().flatten()).for_each(|(place, number)| *place = number.to_le_bytes());
+        hasher.update(&bytes[..pixels.len() * 12]);
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 // ---- Failure detection -------------------------------------------------------------------------------------------------
 
 /// How often a node sends a heartbeat.
-pub const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(50);
+pub const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Silence after which a node is suspected and its parts are given to others.
 pub const SUSPECT_AFTER: Duration = Duration::from_millis(500);
@@ -70,6 +70,9 @@ pub const STREAM_WINDOW_BYTES: u32 = 8 << 20;
 /// Bytes of all streams of one connection that may be under way.
 pub const RECEIVE_WINDOW_BYTES: u32 = 32 << 20;
 
+/// Bytes of packets that have come to the coordinator and are not read yet: room for what a thousand nodes send while it is busy elsewhere.
+pub const SOCKET_BYTES: usize = 64 << 20;
+
 /// Bytes that a reader makes room for at once: more comes only as bytes do.
 pub const READ_CHUNK_BYTES: usize = 64 << 10;
 
@@ -87,6 +90,9 @@ pub const PART_HEADER_BYTES: usize = 256;
 
 /// Pixels of one part.
 pub const PART_BYTES: usize = 1 << 30;
+
+/// Bytes of a part that is hashed where it comes in: handing it to another thread would take as long.
+pub const HASHED_AT_ONCE_BYTES: usize = 256 << 10;
 
 /// A [`crate::wire::Request`] frame: a submission holds a whole description.
 pub const REQUEST_BYTES: usize = 256 << 20;
@@ -366,6 +372,9 @@ pub const PROBE_PATCH_PER_AXIS: u32 = 4;
 
 /// Parts a node holds beyond those its lanes render, so that no lane waits for the network.
 pub const PREFETCH_PER_LANE: usize = 1;
+
+/// Between two looks at what nodes could take from others, for each node: a bound of the share of its time that a coordinator spends with it.
+pub const STEAL_PAUSE_PER_NODE: Duration = Duration::from_micros(20);
 
 /// How often a node that found nothing worth taking from another looks again.
 pub const STEAL_INTERVAL: Duration = Duration::from_millis(200);

@@ -47,6 +47,7 @@ struct Stretch {
     beats: f64,
     settled: f64,
     waits: Vec<f64>,
+    ends: Vec<String>,
 }
 
 impl Bench {
@@ -58,7 +59,7 @@ impl Bench {
         let (usage, own) = (self.meter.look(), self.own.look().cores);
         let rate = |now: u64, before: u64| (now - before) as f64 / usage.seconds;
         let (beats, settled) = (rate(self.fleet.tally.beats(), beats), rate(self.fleet.tally.settled(), settled));
-        Stretch { own, beats, settled, waits: self.fleet.tally.take_waits(), usage }
+        Stretch { own, beats, settled, waits: self.fleet.tally.take_waits(), ends: self.fleet.tally.ends(), usage }
     }
 
     /// Sets the load to so many parts a second.
@@ -68,7 +69,7 @@ impl Bench {
 }
 
 fn print(what: &str, stretch: &Stretch) {
-    let Stretch { usage, own, beats, settled, waits } = stretch;
+    let Stretch { usage, own, beats, settled, waits, ends } = stretch;
     let milliseconds = |share| quantile(waits, share) * 1e3;
     println!(
         "{what}: {settled:.0} parts/s on disk, {beats:.0} heartbeats/s, {:.2} cores, peak {:.0} MiB, acknowledged after {:.0} ms (p99 {:.0} ms); the load took {own:.2} cores",
@@ -77,6 +78,9 @@ fn print(what: &str, stretch: &Stretch) {
         milliseconds(0.5),
         milliseconds(0.99)
     );
+    if !ends.is_empty() {
+        println!("    {} connections ended so far, as: {}", ends.len(), ends[ends.len() - 1]);
+    }
     let threads: Vec<String> = usage.threads.iter().take(6).map(|(name, cores)| format!("{name} {cores:.2}")).collect();
     println!("    threads: {}", threads.join(", "));
 }
@@ -104,7 +108,7 @@ fn main() {
     let begin = Instant::now();
     let fleet = Fleet::start(nodes, &program.path("keys"), to, nodes as f64 / GOAL);
     let mut bench = Bench { fleet, meter: Meter::new(coordinator.pid()), own: Meter::new(std::process::id() as i32), nodes };
-    wait_until("all nodes are connected", 120, || bench.fleet.tally.connected() == nodes as u64);
+    wait_until("all nodes are connected", 60, || bench.fleet.tally.connected() as f64 >= REACHED * nodes as f64);
     println!("{nodes} nodes connected in {:.1} s", begin.elapsed().as_secs_f64());
     thread::sleep(Duration::from_secs(5));
     let idle = bench.measure(seconds / 2.0);

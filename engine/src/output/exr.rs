@@ -28,8 +28,12 @@ use ::exr::{
 use half::{f16, slice::HalfFloatSliceExt};
 use serde::{Deserialize, Serialize};
 
-use super::{OutputError, write_atomically, zip::Compressor};
-use crate::{REVISION, description::FrameHash, film::Film};
+use super::{OutputError, Rows, write_atomically, zip::Compressor};
+use crate::{
+    REVISION,
+    description::FrameHash,
+    film::{self, Film},
+};
 
 /// How the file holds its numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,18 +70,27 @@ const ATTRIBUTE: &str = "tessera";
 /// The largest finite half float.
 const HALF_MAX: f32 = 65_504.0;
 
-/// Writes a film; equal films and identities give equal bytes. Returns how many numbers were too large for a half float and were clamped.
+/// What was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Written {
+    /// BLAKE3 of the pixels as they stand in the file, in the order of [`Film::hash`].
+    pub hash: [u8; 32],
+    /// Numbers that were too large for a half float and were clamped.
+    pub clamped: u64,
+}
+
+/// Writes a picture, of which it holds a few rows at a time; equal pictures and identities give equal bytes.
 ///
 /// # Errors
-/// If the file cannot be written; an older one then stays as it was.
-pub fn write(path: &Path, film: &Film, pixel_type: PixelType, identity: &Identity) -> Result<u64, OutputError> {
-    let header = header(film, pixel_type, identity);
-    let mut clamped = 0;
+/// If the file cannot be written, or rows cannot be read; an older file then stays as it was.
+pub fn write(path: &Path, mut picture: impl Rows, pixel_type: PixelType, identity: &Identity) -> Result<Written, OutputError> {
+    let header = header(picture.size(), pixel_type, identity);
+    let mut chunks = Chunks::new(pixel_type);
     write_atomically(path, |file| {
-        let chunks = |_, writer: &mut _| write_chunks(writer, film, pixel_type).map(|count| clamped = count);
-        block::write(file, [header?].into_iter().collect(), true, chunks).map_err(io_error)
+        let write = |_, writer: &mut _| chunks.write(writer, &mut picture);
+        block::write(file, [header?].into_iter().collect(), true, write).map_err(io_error)
     })?;
-    Ok(clamped)
+    Ok(Written { hash: *chunks.hasher.finalize().as_bytes(), clamped: chunks.clamped })
 }
 
 /// Rows of one chunk of the compression ZIP16.
@@ -86,14 +99,13 @@ const ROWS: usize = 16;
 /// Channels in the order of the file, which is that of their names, and where a pixel of the film holds them.
 const CHANNELS: [(&str, usize); 3] = [("B", 2), ("G", 1), ("R", 0)];
 
-fn header(film: &Film, pixel_type: PixelType, identity: &Identity) -> io::Result<Header> {
+fn header((width, height): (u32, u32), pixel_type: PixelType, identity: &Identity) -> io::Result<Header> {
     let sample_type = match pixel_type {
         PixelType::Float => SampleType::F32,
         PixelType::Half => SampleType::F16,
     };
     let channels = CHANNELS.map(|(name, _)| ChannelDescription::named(name, sample_type)).into_iter().collect();
-    let size = (film.width() as usize, film.height() as usize);
-    let mut header = Header::new(text(ATTRIBUTE)?, size, channels)
+    let mut header = Header::new(text(ATTRIBUTE)?, (width as usize, height as usize), channels)
         .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_attributes(LayerAttributes::default());
     header.shared_attributes.pixel_aspect = 1.0;
@@ -104,31 +116,56 @@ fn header(film: &Film, pixel_type: PixelType, identity: &Identity) -> io::Result
     Ok(header)
 }
 
-/// Returns how many numbers were clamped. The crate would compress chunks by itself, but four times slower than [`Compressor`] for files that are not
-/// much smaller.
-fn write_chunks(writer: &mut impl ChunksWriter, film: &Film, pixel_type: PixelType) -> Result<u64, Error> {
-    let (mut compressor, mut numbers, mut halves, mut bytes) = (Compressor::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut clamped = 0;
-    let chunks = film.pixels().chunks(ROWS * film.width() as usize);
-    for (index, (y_coordinate, rows)) in (0_i32..).step_by(ROWS).zip(chunks).enumerate() {
-        bytes.clear();
-        for row in rows.chunks(film.width() as usize) {
-            for (_, component) in CHANNELS {
-                numbers.clear();
-                numbers.extend(row.iter().map(|pixel| pixel[component]));
-                match pixel_type {
-                    PixelType::Float => append(&mut bytes, &numbers, f32::to_le_bytes),
-                    PixelType::Half => {
-                        clamped += round_to_halves(&mut numbers, &mut halves);
-                        append(&mut bytes, &halves, f16::to_le_bytes);
-                    }
+/// Makes chunks out of rows. The crate would compress them by itself, but four times slower than [`Compressor`] for files that are not much smaller.
+struct Chunks {
+    pixel_type: PixelType,
+    compressor: Compressor,
+    hasher: blake3::Hasher,
+    clamped: u64,
+    /// Of one channel of one row.
+    numbers: Vec<f32>,
+    halves: Vec<f16>,
+    /// Of one chunk.
+    bytes: Vec<u8>,
+}
+
+impl Chunks {
+    fn new(pixel_type: PixelType) -> Self {
+        let (numbers, halves, bytes) = (Vec::new(), Vec::new(), Vec::new());
+        Self { pixel_type, compressor: Compressor::new(), hasher: blake3::Hasher::new(), clamped: 0, numbers, halves, bytes }
+    }
+
+    fn write(&mut self, writer: &mut impl ChunksWriter, picture: &mut impl Rows) -> Result<(), Error> {
+        let (width, height) = picture.size();
+        let mut band = vec![[0.0; 3]; width as usize * ROWS.min(height as usize)];
+        for (index, y) in (0..height).step_by(ROWS).enumerate() {
+            let band = &mut band[..width as usize * ROWS.min((height - y) as usize)];
+            picture.read(y, band)?;
+            self.bytes.clear();
+            band.chunks_mut(width as usize).for_each(|row| self.add(row));
+            let compressed_pixels_le = self.compressor.compress(&self.bytes);
+            let block = CompressedScanLineBlock { y_coordinate: y as i32, compressed_pixels_le };
+            writer.write_chunk(index, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })?;
+        }
+        Ok(())
+    }
+
+    /// Adds a row to the chunk, channel by channel, and to the hash as it then stands in the file.
+    fn add(&mut self, row: &mut [[f32; 3]]) {
+        for (_, component) in CHANNELS {
+            self.numbers.clear();
+            self.numbers.extend(row.iter().map(|pixel| pixel[component]));
+            match self.pixel_type {
+                PixelType::Float => append(&mut self.bytes, &self.numbers, f32::to_le_bytes),
+                PixelType::Half => {
+                    self.clamped += round_to_halves(&mut self.numbers, &mut self.halves);
+                    append(&mut self.bytes, &self.halves, f16::to_le_bytes);
+                    row.iter_mut().zip(&self.halves).for_each(|(pixel, half)| pixel[component] = half.to_f32());
                 }
             }
         }
-        let block = CompressedScanLineBlock { y_coordinate, compressed_pixels_le: compressor.compress(&bytes) };
-        writer.write_chunk(index, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })?;
+        film::hash_row(&mut self.hasher, row);
     }
-    Ok(clamped)
 }
 
 /// Appends the bytes of numbers.
@@ -198,7 +235,7 @@ pub fn read_picture(mut bytes: impl Read + Seek, length: u64) -> io::Result<Pict
         Some((_, AttributeValue::Text(json))) => Some(serde_json::from_str(&json.to_string())?),
         _ => None,
     };
-    Ok(Picture { film: film(&image)?, identity })
+    Ok(Picture { film: film_of(&image)?, identity })
 }
 
 /// What one byte of a file can become at the most: deflate's best ratio is 1032, and PXR24 leaves one byte of four out before it.
@@ -219,7 +256,7 @@ fn check_size(file: &MetaData, length: u64) -> io::Result<()> {
 /// An image of one layer, as the crate reads it.
 type FlatImage = Image<Layer<AnyChannels<FlatSamples>>>;
 
-fn film(image: &FlatImage) -> io::Result<Film> {
+fn film_of(image: &FlatImage) -> io::Result<Film> {
     let channels = &image.layer_data.channel_data.list;
     let channel = |name: &str| {
         let found = channels.iter().find(|channel| Text::eq(&channel.name, name) && channel.sampling == Vec2(1, 1));
@@ -248,17 +285,19 @@ mod tests {
         Film::from_pixels(37, 21, pixels).unwrap()
     }
 
-    fn written(pixel_type: PixelType) -> (u64, Vec<u8>, Picture) {
+    fn written(pixel_type: PixelType) -> (Written, Vec<u8>, Picture) {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.exr");
-        let clamped = write(&path, &film(), pixel_type, &identity()).unwrap();
-        (clamped, fs::read(&path).unwrap(), read(&path).unwrap())
+        let written = write(&path, &film(), pixel_type, &identity()).unwrap();
+        let picture = read(&path).unwrap();
+        assert_eq!(written.hash, picture.film.hash(), "the hash is not that of what stands in the file");
+        (written, fs::read(&path).unwrap(), picture)
     }
 
     #[test]
     fn floats_come_back_to_the_bit() {
-        let (clamped, _, picture) = written(PixelType::Float);
-        assert_eq!(clamped, 0);
+        let (written, _, picture) = written(PixelType::Float);
+        assert_eq!(written.clamped, 0);
         assert!(picture.film == film(), "the pixels differ");
         assert_eq!(picture.identity, Some(identity()));
     }
@@ -266,8 +305,8 @@ mod tests {
     /// Halves have 11 bits: the nearest lies within 2^-11 of the number.
     #[test]
     fn halves_are_rounded_and_clamped_and_the_clamped_are_counted() {
-        let (clamped, _, picture) = written(PixelType::Half);
-        assert_eq!(clamped, film().pixels().iter().filter(|pixel| pixel[2] > 1e29).count() as u64);
+        let (written, _, picture) = written(PixelType::Half);
+        assert_eq!(written.clamped, film().pixels().iter().filter(|pixel| pixel[2] > 1e29).count() as u64);
         for (half, full) in picture.film.pixels().iter().flatten().zip(film().pixels().iter().flatten()) {
             let full = full.min(65_504.0);
             assert!((half - full).abs() <= full * 2.0_f32.powi(-11) + 1e-7, "{half} is not {full}");

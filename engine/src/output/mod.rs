@@ -3,6 +3,8 @@
 mod atomic;
 pub mod exr;
 pub mod png;
+mod rows;
 mod zip;
 
 pub use atomic::{OutputError, write_atomically};
+pub use rows::Rows;

@@ -7,43 +7,54 @@ use std::{
     path::Path,
 };
 
-use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
+use png::{BitDepth, ColorType, Compression, Encoder, Filter, chunk};
 
-use super::{OutputError, write_atomically};
-use crate::film::Film;
+use super::{OutputError, Rows, write_atomically};
 
-/// Writes a film as PNG; `exposure` is in stops. Rectangles `[x, y, width, height]` that are not rendered become magenta.
+/// Writes a picture as PNG, row by row; `exposure` is in stops. Rectangles `[x, y, width, height]` that are not rendered become magenta.
 ///
 /// # Errors
-/// If the file cannot be written; an older one then stays as it was.
-pub fn write(path: &Path, film: &Film, holes: &[[u32; 4]], exposure: f64) -> Result<(), OutputError> {
-    let coded = encode(film, holes, exposure);
-    write_atomically(path, |file| file.write_all(&coded?))
+/// If the file cannot be written, or rows cannot be read; an older file then stays as it was.
+pub fn write(path: &Path, picture: impl Rows, holes: &[[u32; 4]], exposure: f64) -> Result<(), OutputError> {
+    write_atomically(path, |file| encode(file, picture, holes, exposure))
 }
 
-/// Where the chunks after `IHDR` begin: 8 bytes of signature, 25 of `IHDR`.
-const AFTER_HEADER: usize = 33;
+/// Bytes of compressed pixels that stand in one chunk of the file.
+const CHUNK_BYTES: usize = 1 << 20;
 
-/// The chunk that says sRGB, perceptual intent: length, name, intent, checksum (PNG specification, 11.3.2.5).
-const SRGB_CHUNK: [u8; 13] = *b"\0\0\0\x01sRGB\0\xae\xce\x1c\xe9";
+/// Perceptual intent (PNG specification, 11.3.2.5).
+const PERCEPTUAL: u8 = 0;
 
 /// No surface is as loud as this.
 const HOLE: [u8; 3] = [255, 0, 255];
 
-fn encode(film: &Film, holes: &[[u32; 4]], exposure: f64) -> io::Result<Vec<u8>> {
-    let scale = libm::exp2(exposure);
-    let quantizer = Quantizer::new();
-    let mut bytes: Vec<u8> = film.pixels().iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)).collect();
-    holes.iter().for_each(|hole| mark(&mut bytes, film.width(), *hole));
-    let mut coded = Vec::new();
-    PngEncoder::new(&mut coded).write_image(&bytes, film.width(), film.height(), ExtendedColorType::Rgb8).map_err(io::Error::other)?;
-    coded.splice(AFTER_HEADER..AFTER_HEADER, SRGB_CHUNK);
-    Ok(coded)
+fn encode(file: &mut impl Write, mut picture: impl Rows, holes: &[[u32; 4]], exposure: f64) -> io::Result<()> {
+    let (width, height) = picture.size();
+    let (scale, quantizer) = (libm::exp2(exposure), Quantizer::new());
+    let mut encoder = Encoder::new(file, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(BitDepth::Eight);
+    encoder.set_compression(Compression::Fast);
+    encoder.set_filter(Filter::Adaptive);
+    let mut writer = encoder.write_header()?;
+    writer.write_chunk(chunk::sRGB, &[PERCEPTUAL])?;
+    let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
+    let (mut row, mut bytes) = (vec![[0.0; 3]; width as usize], Vec::new());
+    for y in 0..height {
+        picture.read(y, &mut row)?;
+        bytes.clear();
+        bytes.extend(row.iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)));
+        holes.iter().for_each(|hole| mark(&mut bytes, y, *hole));
+        stream.write_all(&bytes)?;
+    }
+    stream.finish()?;
+    Ok(writer.finish()?)
 }
 
-fn mark(bytes: &mut [u8], width: u32, [x, y, columns, rows]: [u32; 4]) {
-    for row in bytes.chunks_exact_mut(3 * width as usize).skip(y as usize).take(rows as usize) {
-        row.chunks_exact_mut(3).skip(x as usize).take(columns as usize).for_each(|pixel| pixel.copy_from_slice(&HOLE));
+/// Marks what row `y` has of a hole.
+fn mark(bytes: &mut [u8], y: u32, [x, top, columns, rows]: [u32; 4]) {
+    if (top..top.saturating_add(rows)).contains(&y) {
+        bytes.chunks_exact_mut(3).skip(x as usize).take(columns as usize).for_each(|pixel| pixel.copy_from_slice(&HOLE));
     }
 }
 
@@ -71,13 +82,16 @@ fn srgb_to_linear(code: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::{Counters, Rect, RenderedPart};
+    use crate::film::Film;
 
     fn film(pixels: &[[f32; 3]]) -> Film {
-        let rect = Rect { x: 0, y: 0, width: pixels.len() as u32, height: 1 };
-        let mut film = Film::new(rect.width, 1);
-        film.place(&RenderedPart { rect, pixels: pixels.to_vec(), counters: Counters::default() }).unwrap();
-        film
+        Film::from_pixels(pixels.len() as u32, 1, pixels.to_vec()).unwrap()
+    }
+
+    fn encode(film: &Film, holes: &[[u32; 4]], exposure: f64) -> io::Result<Vec<u8>> {
+        let mut coded = Vec::new();
+        super::encode(&mut coded, film, holes, exposure)?;
+        Ok(coded)
     }
 
     #[test]

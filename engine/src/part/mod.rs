@@ -14,7 +14,7 @@ pub use canary::{CanaryError, canary, canary_hash};
 pub use counters::Counters;
 pub use pairwise::PairwiseSum;
 pub use render::{probe, render};
-pub use rendered::{RenderedPart, WrongLength};
+pub use rendered::{RenderedPart, WrongLength, hash_of_bytes};
 
 /// A rectangle of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -47,14 +47,18 @@ impl RenderedPart {
 
     /// BLAKE3 over the rectangle (x, y, width, height as little-endian u32) and the bytes of the pixels.
     pub fn hash(&self) -> [u8; 32] {
-        let mut hasher = blake3::Hasher::new();
-        let Rect { x, y, width, height } = self.rect;
-        for number in [x, y, width, height] {
-            hasher.update(&number.to_le_bytes());
-        }
-        hasher.update(&self.to_bytes());
-        *hasher.finalize().as_bytes()
+        hash_of_bytes(self.rect, &self.to_bytes())
     }
+}
+
+/// [`RenderedPart::hash`] of the part whose pixels are coded as these bytes.
+pub fn hash_of_bytes(rect: Rect, bytes: &[u8]) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new();
+    let Rect { x, y, width, height } = rect;
+    for number in [x, y, width, height] {
+        hasher.update(&number.to_le_bytes());
+    }
+    *hasher.update(bytes).finalize().as_bytes()
 }
 
 #[cfg(test)]

@@ -1,18 +1,17 @@
 //! From committed parts to files.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     sync::Arc,
     time::{Duration, Instant, UNIX_EPOCH},
 };
 
 use tessera_engine::{
-    film::Film,
-    output::{exr, png},
-    part::{Counters, Rect, RenderedPart},
+    output::{Rows, exr, png},
+    part::Rect,
 };
 
-use super::{disk::Pixels, store::StoredJob};
+use super::{bands::Bands, disk::Pixels, store::StoredJob};
 use crate::{
     farm::{JobId, JobRecord, LeaseId},
     job::{JobDescription, PixelType},
@@ -51,12 +50,17 @@ pub enum Refusal {
 /// # Errors
 /// Pixels that cannot be read back, or a disk that refuses.
 pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<ReportEntry, Refusal> {
-    let film = film(assembly, pixels)?;
-    write_files(assembly, &film).map_err(Refusal::Files)
+    let size = &assembly.stored.description.frame.film;
+    let reader = pixels.reader(assembly.job).map_err(|error| Refusal::Files(error.to_string()))?;
+    let mut bands = Bands::new((size.width, size.height), reader, &assembly.parts);
+    write_files(assembly, &mut bands).map_err(|reason| match bands.unreadable {
+        Some((part, reason)) => Refusal::Pixels(part, reason),
+        None => Refusal::Files(reason),
+    })
 }
 
-fn write_files(assembly: &Assembly, film: &Film) -> Result<ReportEntry, String> {
-    let image = write_pictures(&assembly.stored.description, film, &assembly.holes, &assembly.files)?;
+fn write_files(assembly: &Assembly, picture: &mut Bands) -> Result<ReportEntry, String> {
+    let image = write_pictures(&assembly.stored.description, picture, &assembly.holes, &assembly.files)?;
     let Assembly { job, stored, record, .. } = assembly;
     let submission = Submission {
         id: job.0,
@@ -71,23 +75,11 @@ fn write_files(assembly: &Assembly, film: &Film) -> Result<ReportEntry, String> 
     Ok(manifest.report)
 }
 
-fn film(assembly: &Assembly, pixels: &Pixels) -> Result<Film, Refusal> {
-    let size = &assembly.stored.description.frame.film;
-    let mut film = Film::new(size.width, size.height);
-    for (part, rect, lease) in &assembly.parts {
-        let unreadable = |error: &dyn std::fmt::Display| Refusal::Pixels(*part, error.to_string());
-        let bytes = pixels.read(assembly.job, *lease).map_err(|error| unreadable(&error))?;
-        let rendered = RenderedPart::from_bytes(*rect, Counters::default(), &bytes).map_err(|error| unreadable(&error))?;
-        film.place(&rendered).map_err(|error| unreadable(&error))?;
-    }
-    Ok(film)
-}
-
 /// Writes the EXR and the preview into a folder, and says what there is to know of them. Holes are black in the one, and marked in the other.
 ///
 /// # Errors
 /// In words, when the disk refuses.
-pub fn write_pictures(description: &JobDescription, film: &Film, holes: &[Rect], folder: &std::path::Path) -> Result<ImageEntry, String> {
+pub fn write_pictures(description: &JobDescription, mut picture: impl Rows, holes: &[Rect], folder: &Path) -> Result<ImageEntry, String> {
     let JobDescription { frame, output, .. } = description;
     let hash = frame.hash().map_err(|error| error.to_string())?;
     let (written, noted) = match output.pixel_type {
@@ -97,19 +89,17 @@ pub fn write_pictures(description: &JobDescription, film: &Film, holes: &[Rect],
     let path = folder.join(&output.exr);
     let holes: Vec<[u32; 4]> = holes.iter().map(|hole| [hole.x, hole.y, hole.width, hole.height]).collect();
     let identity = exr::Identity { holes: holes.clone(), ..exr::Identity::new(hash, frame.seed) };
-    let clamped = exr::write(&path, film, written, &identity).map_err(|error| error.to_string())?;
-    let pixels_hash = match output.pixel_type {
-        PixelType::Float => film.hash(),
-        PixelType::Half => exr::read(&path).map_err(|error| error.to_string())?.film.hash(),
-    };
+    let exr::Written { hash: pixels_hash, clamped } =
+        exr::write(&path, &mut picture, written, &identity).map_err(|error| error.to_string())?;
+    let (width, height) = picture.size();
     if let Some(name) = &output.png {
-        png::write(&folder.join(name), film, &holes, output.exposure).map_err(|error| error.to_string())?;
+        png::write(&folder.join(name), &mut picture, &holes, output.exposure).map_err(|error| error.to_string())?;
     }
     Ok(ImageEntry {
         exr: output.exr.clone(),
         png: output.png.clone(),
-        width: film.width(),
-        height: film.height(),
+        width,
+        height,
         samples: u64::from(frame.quality.samples),
         seed: frame.seed,
         image_hash: hash.to_string(),

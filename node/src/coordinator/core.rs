@@ -67,6 +67,9 @@ pub struct Core {
     pub(super) published: watch::Sender<Arc<Status>>,
     /// Whether more than a sign of life has come since the status was published.
     pub(super) changed: bool,
+    /// When the farm wants to be told of the time, or earlier; `None` if that is to be asked anew. Signs of life, by far the most frequent events,
+    /// only put it off.
+    pub(super) due: Option<Option<Duration>>,
 }
 
 impl Core {
@@ -113,6 +116,7 @@ impl Core {
             pixels: BTreeMap::new(),
             published,
             changed: true,
+            due: None,
         };
         core.recover()?;
         Ok(core)
@@ -154,6 +158,9 @@ impl Core {
                 () = sleep_until(deadline.unwrap_or(self.begin).into()), if deadline.is_some() => {}
                 () = sleep_until(publish), if self.changed => {}
             }
+            if self.deadline().is_some_and(|deadline| deadline <= Instant::now()) {
+                self.due = None;
+            }
             if let Some(deadline) = self.deadline().filter(|deadline| *deadline <= Instant::now()) {
                 self.tick(deadline);
             }
@@ -165,8 +172,9 @@ impl Core {
     }
 
     /// When the core wants to be told of the time.
-    fn deadline(&self) -> Option<Instant> {
-        self.farm.next_deadline().map(|at| self.begin + at.saturating_sub(self.offset))
+    fn deadline(&mut self) -> Option<Instant> {
+        let due = *self.due.get_or_insert_with(|| self.farm.next_deadline());
+        due.map(|at| self.begin + at.saturating_sub(self.offset))
     }
 
     /// Time has come. If it is long past, this process itself was away, and the silence of others says nothing.
@@ -307,7 +315,11 @@ impl Core {
 
     pub(super) fn step(&mut self, event: Event) {
         let now = self.offset + self.begin.elapsed();
-        self.changed |= !matches!(event, Event::NodeHeard { .. });
+        match event {
+            Event::NodeHeard { node, .. } if !self.farm.is_suspected(node) => {}
+            Event::NodeHeard { .. } => self.due = None,
+            _ => (self.changed, self.due) = (true, None),
+        }
         self.disk.note(&self.farm, now, &event);
         self.shared.metrics.events.inc();
         let silence = matches!(event, Event::Tick);

@@ -16,7 +16,7 @@ use super::input::Input;
 use crate::{
     error::{Error, ExitCode, Result},
     farm::{Event, Farm, FarmConfig, JobId, LeaseId},
-    journal::{Filter, Journal},
+    journal::{Filter, Journal, PixelReader},
     limits::{DISK_RETRY, JOURNAL_BATCH},
     schedule::PartId,
     web::Metrics,
@@ -49,12 +49,12 @@ impl Pixels {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The pixels of an attempt, as they were stored.
+    /// Reads pixels of a job, without holding up those that are stored.
     ///
     /// # Errors
-    /// When they are not there any more, or were changed.
-    pub fn read(&self, job: JobId, lease: LeaseId) -> Result<Vec<u8>> {
-        self.lock().read_pixels(job, lease)
+    /// When the disk refuses.
+    pub fn reader(&self, job: JobId) -> Result<PixelReader> {
+        self.lock().reader(job)
     }
 
     /// Attempts of a job whose pixels are on disk.

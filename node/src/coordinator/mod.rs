@@ -2,6 +2,7 @@
 
 mod asked;
 mod assemble;
+mod bands;
 mod canary;
 mod core;
 mod disk;

@@ -3,7 +3,7 @@
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::{Path, PathBuf},
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
 use serde::{Deserialize, Serialize};
@@ -17,7 +17,11 @@ use crate::{
 
 /// The register.
 #[derive(Clone)]
-pub struct Register(Arc<Mutex<Pages>>);
+pub struct Register {
+    pages: Arc<Mutex<Pages>>,
+    /// Names that were seen and are not in the pages yet: a thousand that come at once are written together.
+    seen: Arc<Mutex<BTreeSet<String>>>,
+}
 
 struct Pages {
     path: PathBuf,
@@ -55,20 +59,21 @@ impl Register {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Entries::default(),
             Err(error) => return Err(bad(error.to_string())),
         };
-        Ok(Self(Arc::new(Mutex::new(Pages { path, entries }))))
+        Ok(Self { pages: Arc::new(Mutex::new(Pages { path, entries })), seen: Arc::default() })
     }
 
     /// Notes a name that somebody has a certificate for. Waits for the disk if it is new.
     pub fn see(&self, peer: &Peer) {
-        if self.0.lock().unwrap_or_else(PoisonError::into_inner).entries.names.contains(&peer.to_string()) {
-            return;
-        }
-        let noted =
-            self.change(
-                |entries| {
-                    if entries.names.len() < REGISTER && entries.names.insert(peer.to_string()) { Ok(Some(())) } else { Ok(None) }
-                },
-            );
+        self.seen().insert(peer.to_string());
+        let noted = self.change(|entries| {
+            // None are left where another call has written them meanwhile.
+            let mut news = std::mem::take(&mut *self.seen());
+            news.retain(|name| !entries.names.contains(name));
+            let room = REGISTER.saturating_sub(entries.names.len());
+            let before = entries.names.len();
+            entries.names.extend(news.into_iter().take(room));
+            Ok((entries.names.len() > before).then_some(()))
+        });
         if let Err(error) = noted {
             tracing::error!(error, "a name could not be noted");
         }
@@ -108,9 +113,13 @@ impl Register {
         Ok(given)
     }
 
+    fn seen(&self) -> MutexGuard<'_, BTreeSet<String>> {
+        self.seen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// Changes the entries, if `act` says so; what is not on disk has not happened.
     fn change(&self, act: impl FnOnce(&mut Entries) -> Result<Option<()>, String>) -> Result<(), String> {
-        let mut pages = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut pages = self.pages.lock().unwrap_or_else(PoisonError::into_inner);
         let mut entries = pages.entries.clone();
         if act(&mut entries)?.is_some() {
             let text = serde_json::to_vec(&entries).map_err(|error| error.to_string())?;

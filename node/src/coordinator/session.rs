@@ -10,10 +10,7 @@ use std::{
 };
 
 use quinn::{Connection, ConnectionError, RecvStream, SendStream};
-use tessera_engine::{
-    description::AssetId,
-    part::{Counters, RenderedPart},
-};
+use tessera_engine::{description::AssetId, part::hash_of_bytes};
 use tokio::{
     io::AsyncWriteExt,
     sync::{mpsc, oneshot},
@@ -28,7 +25,7 @@ use super::{
 use crate::{
     farm::{Incarnation, JobId, LeaseId},
     limits::{
-        CONNECT_TIMEOUT, CONTROL_BYTES, FRAME_PATIENCE, HEARTBEAT_INTERVAL, HEARTBEATS_PER_INTERVAL, HELLO_BYTES, LANES, NODE_REST,
+        CONNECT_TIMEOUT, CONTROL_BYTES, FRAME_PATIENCE, HASHED_AT_ONCE_BYTES, HEARTBEAT_INTERVAL, HEARTBEATS_PER_INTERVAL, HELLO_BYTES, LANES, NODE_REST,
         PART_BYTES, PART_HEADER_BYTES, PEER_QUEUE, REASON_BYTES,
     },
     wire::{self, CLOSE_ANEW, FrameError, FromNode, Heartbeat, Hello, NodeStream, PartHeader},
@@ -222,12 +219,11 @@ async fn read_part(shared: &Shared, from: &Source, stream: &mut RecvStream) -> R
     let read = timeout(wire::patience(length as u64), stream.read_to_end(length)).await;
     from.arriving.lock().unwrap_or_else(PoisonError::into_inner).remove(&attempt);
     let bytes = read.map_err(|_| "a part that came too slowly")?.map_err(|error| error.to_string())?;
-    let rect = lease.rect;
-    let expected = header.hash;
-    let check = move || {
-        let part = RenderedPart::from_bytes(rect, Counters::default(), &bytes).ok()?;
-        (part.hash() == expected).then_some(bytes)
-    };
+    let (rect, expected) = (lease.rect, header.hash);
+    let check = move || (bytes.len() == length && hash_of_bytes(rect, &bytes) == expected).then_some(bytes);
+    if length <= HASHED_AT_ONCE_BYTES {
+        return Ok((header, check()));
+    }
     let checked = tokio::task::spawn_blocking(check).await.map_err(|error| error.to_string())?;
     Ok((header, checked))
 }

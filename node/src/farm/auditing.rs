@@ -52,12 +52,12 @@ impl Job {
     }
 
     /// Lets idle nodes render delivered parts again.
-    pub(super) fn audit(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
+    pub(super) fn audit(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if self.audits.is_empty() || !self.loose.is_empty() {
             return;
         }
         let strays = self.strays();
-        for id in self.idle(turn, nodes, ids) {
+        for id in self.idle(turn, nodes) {
             while self.is_idle(turn, nodes, id) {
                 let free = |part: &PartId| self.may_audit(*part, id) && !strays.contains(&(*part, id));
                 let Some(part) = self.audits.iter().copied().find(free) else { break };

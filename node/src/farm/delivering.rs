@@ -5,6 +5,7 @@ use super::node::Nodes;
 use super::part::{Lease, PartState, Place, Role};
 use super::turn::Turn;
 use super::{Command, DiscardReason, Farm, Incarnation, JobId, LeaseId, ToNode};
+use crate::limits::ATTEMPTS_LISTED_PER_PART;
 use crate::manifest::AttemptOutcome;
 use crate::schedule::{NodeId, PartId};
 
@@ -91,11 +92,19 @@ impl Job {
 
     /// Calls back all open attempts at a part.
     pub(super) fn cancel_attempts(&mut self, turn: &mut Turn, nodes: &mut Nodes, part: PartId, reason: &str) {
-        let open: Vec<LeaseId> = self.leases.iter().filter(|(_, lease)| lease.part == part).map(|(lease, _)| *lease).collect();
-        for lease in open {
+        for lease in self.open_attempts(part) {
             self.call_back(turn, nodes, lease);
             self.close(turn, nodes, lease, AttemptOutcome::Cancelled, reason);
         }
+    }
+
+    /// Attempts at a part that may still end well.
+    fn open_attempts(&self, part: PartId) -> Vec<LeaseId> {
+        let state = self.part(part);
+        if state.attempts.len() < ATTEMPTS_LISTED_PER_PART {
+            return state.attempts.iter().map(|attempt| attempt.lease).filter(|lease| self.leases.contains_key(lease)).collect();
+        }
+        self.leases.iter().filter(|(_, lease)| lease.part == part).map(|(lease, _)| *lease).collect()
     }
 
     /// Tells the node of an attempt to stop it.
@@ -129,6 +138,7 @@ impl Job {
     fn let_go(&self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, lease: LeaseId) {
         if let Some(node) = nodes.get_mut(&id) {
             node.held.retain(|held| held.lease != lease);
+            turn.roomy.insert(id);
             if node.held.iter().any(|held| held.job != self.id) {
                 turn.freed.insert(id);
             }
@@ -149,11 +159,11 @@ impl Job {
 
     /// The main attempt at a part is gone: its spare one takes over, or it has no node.
     pub(super) fn loosen(&mut self, part: PartId) {
-        let spare = self.leases.iter_mut().find(|(_, lease)| lease.part == part && lease.role == Role::Spare);
+        let is_spare = |id: &LeaseId| self.leases.get(id).is_some_and(|lease| lease.role == Role::Spare);
+        let spare = self.open_attempts(part).into_iter().find(is_spare);
         match spare {
-            Some((id, lease)) => {
-                lease.role = Role::Main;
-                let id = *id;
+            Some(id) => {
+                self.leases.entry(id).and_modify(|lease| lease.role = Role::Main);
                 self.loose.remove(&part);
                 self.part_mut(part).place = Place::Leased(id);
             }

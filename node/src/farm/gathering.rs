@@ -68,6 +68,9 @@ impl Job {
 
     /// A node that compiles for too long is left out.
     pub(super) fn watch_preparation(&mut self, turn: &mut Turn) {
+        if !turn.ticks {
+            return;
+        }
         let limit = turn.config.prepare_timeout;
         let late = |member: &Member| matches!(member.stage, Stage::Preparing(since) if turn.strikes(since + limit));
         let late: Vec<NodeId> = self.members.iter().filter(|(_, member)| late(member)).map(|(id, _)| *id).collect();

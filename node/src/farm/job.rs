@@ -103,6 +103,8 @@ pub(super) struct Job {
     pub deserted: Option<Duration>,
     /// When nodes with nothing to do look again for something to take.
     pub reconsider: Option<Duration>,
+    /// When nodes may take from others again.
+    pub steal_after: Duration,
     /// When the next attempt will have taken suspiciously long.
     pub next_due: Option<Duration>,
     pub log: Log,
@@ -131,6 +133,7 @@ impl Job {
             cost: (0.0, 0.0),
             split_into: 0,
             reconsider: None,
+            steal_after: Duration::ZERO,
             next_due: None,
             question: None,
             deserted: None,

@@ -38,6 +38,7 @@ impl Farm {
         }
         let (name, heard) = (info.name.clone(), self.turn.now);
         self.nodes.insert(node, Node::new(incarnation, info, heard));
+        self.turn.roomy.insert(node);
         self.note(EventKind::Joined, node, format!("{name} joined"));
         self.send(node, ToNode::Prove);
     }

@@ -24,12 +24,16 @@ impl Farm {
     pub(super) fn lane_is_free(&mut self, id: NodeId, job: JobId, lease: LeaseId) {
         if self.nodes.get_mut(&id).is_some_and(|node| node.hanging.remove(&(job, lease))) {
             self.turn.freed.insert(id);
+            self.turn.roomy.insert(id);
         }
     }
 }
 
 impl Job {
     pub(super) fn watch_progress(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
+        if !turn.ticks {
+            return;
+        }
         let late = |due: std::time::Duration| turn.strikes(due);
         let open = self.leases.iter().filter(|(_, lease)| lease.role != Role::Stray);
         let overdue: Vec<LeaseId> = open.filter(|(_, lease)| lease.due.is_some_and(late)).map(|(id, _)| *id).collect();
@@ -39,6 +43,7 @@ impl Job {
         let stuck = |(id, member): &(&NodeId, &Member)| nodes.get(id).is_some_and(|node| node.lanes() == 0) && holds(id, member);
         let stuck: Vec<NodeId> = self.members.iter().filter(stuck).map(|(id, _)| *id).collect();
         stuck.into_iter().for_each(|id| self.strip(turn, nodes, id, "no lane of its node makes progress"));
+        self.next_due = self.leases.values().filter(|lease| lease.role != Role::Stray).filter_map(|lease| lease.due).min();
     }
 
     fn is_overdue(&mut self, turn: &mut Turn, nodes: &mut Nodes, lease: LeaseId) {

@@ -18,17 +18,15 @@ impl Job {
         }
         self.watch_progress(turn, nodes);
         self.redistribute(turn, nodes);
-        let ids: Vec<NodeId> = self.members.keys().copied().collect();
-        ids.iter().for_each(|id| self.fill(turn, nodes, *id));
+        self.not_full(turn, nodes).into_iter().for_each(|id| self.fill(turn, nodes, id));
         self.reconsider = None;
         if matches!(self.spec.assign, Assign::EarliestFinish) {
-            self.steal(turn, nodes, &ids);
+            self.steal(turn, nodes);
         }
-        self.audit(turn, nodes, &ids);
+        self.audit(turn, nodes);
         if matches!(self.spec.assign, Assign::EarliestFinish | Assign::Script) {
-            self.shorten_tail(turn, nodes, &ids);
+            self.shorten_tail(turn, nodes);
         }
-        self.next_due = self.leases.values().filter(|lease| lease.role != Role::Stray).filter_map(|lease| lease.due).min();
         self.finish(turn, nodes);
     }
 
@@ -81,9 +79,17 @@ impl Job {
         !waits && self.has_room(turn, nodes, id) && nodes.get(&id).is_some_and(|node| node.free_lanes() > 0)
     }
 
+    /// Nodes that may get a part of this job now: at most moments a few among all.
+    pub(super) fn not_full(&self, turn: &Turn, nodes: &Nodes) -> Vec<NodeId> {
+        if !self.may_hand_out(turn) {
+            return Vec::new();
+        }
+        turn.roomy.iter().copied().filter(|id| self.has_room(turn, nodes, *id)).collect()
+    }
+
     /// Nodes that have nothing to do on some lane.
-    pub(super) fn idle(&self, turn: &Turn, nodes: &Nodes, ids: &[NodeId]) -> Vec<NodeId> {
-        ids.iter().copied().filter(|id| self.is_idle(turn, nodes, *id)).collect()
+    pub(super) fn idle(&self, turn: &Turn, nodes: &Nodes) -> Vec<NodeId> {
+        turn.roomy.iter().copied().filter(|id| self.is_idle(turn, nodes, *id)).collect()
     }
 
     /// Hands a part, which is in no queue, to a node.
@@ -103,6 +109,9 @@ impl Job {
         state.begin_attempt(lease, id, turn.now);
         let (rect, suspect, cost) = (state.rect, state.suspect, state.expected);
         node.held.push(Held { job: self.id, lease, suspect });
+        if node.held.len() >= node.capacity(&turn.config) {
+            turn.roomy.remove(&id);
+        }
         turn.quota = turn.quota.saturating_sub(1);
         turn.handed_out = (turn.handed_out.0 + 1, turn.handed_out.1 + cost);
         turn.send(id, node, ToNode::Render { job: self.id, lease, rect, samples: self.all_samples() });

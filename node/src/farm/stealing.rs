@@ -13,7 +13,7 @@ use super::{
     LeaseId,
     part::{Lease, Role},
 };
-use crate::limits::STEAL_INTERVAL;
+use crate::limits::{STEAL_INTERVAL, STEAL_PAUSE_PER_NODE};
 use crate::manifest::AttemptOutcome;
 use crate::schedule::{NodeId, PartId};
 
@@ -51,13 +51,18 @@ struct Victim {
 
 impl Job {
     /// Lets nodes with room take parts from others; asks to be woken while some find nothing that is worth it.
-    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
-        self.reconsider = None;
-        let thieves: Vec<NodeId> = ids.iter().copied().filter(|id| self.has_room(turn, nodes, *id)).collect();
+    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
+        let thieves = self.not_full(turn, nodes);
         if thieves.is_empty() {
             return;
         }
-        let mut victims: Vec<Victim> = ids.iter().filter_map(|id| self.victim(turn.now, nodes, *id)).collect();
+        // To look through all nodes for each part that comes in would take a large farm's coordinator more time than it has.
+        if turn.now < self.steal_after {
+            self.reconsider = Some(self.steal_after);
+            return;
+        }
+        self.steal_after = turn.now + STEAL_PAUSE_PER_NODE * u32::try_from(self.members.len()).unwrap_or(u32::MAX);
+        let mut victims: Vec<Victim> = self.members.keys().filter_map(|id| self.victim(turn.now, nodes, *id)).collect();
         for thief in thieves {
             while self.has_room(turn, nodes, thief) && self.steal_one(turn, nodes, thief, &mut victims) {}
         }

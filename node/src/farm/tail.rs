@@ -30,11 +30,11 @@ struct Straggler {
 
 impl Job {
     /// Lets idle lanes help with what others still render.
-    pub(super) fn shorten_tail(&mut self, turn: &mut Turn, nodes: &mut Nodes, ids: &[NodeId]) {
+    pub(super) fn shorten_tail(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if !self.loose.is_empty() || self.question.is_some() {
             return;
         }
-        let idle = self.idle(turn, nodes, ids);
+        let idle = self.idle(turn, nodes);
         if idle.is_empty() {
             return;
         }

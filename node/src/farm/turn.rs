@@ -32,6 +32,8 @@ pub(super) struct Turn {
     /// Attempts that it has handed out, and what they cost.
     #[serde(skip)]
     pub handed_out: (usize, f64),
+    /// Nodes that may have room for an attempt; all others have none.
+    pub roomy: BTreeSet<NodeId>,
     /// Whether a job has ended in this step.
     #[serde(skip)]
     pub ended: bool,
@@ -53,6 +55,7 @@ impl Turn {
             last_name: 0,
             quota: 0,
             handed_out: (0, 0.0),
+            roomy: BTreeSet::new(),
             ended: false,
             build: None,
             freed: BTreeSet::new(),

@@ -18,6 +18,7 @@ use std::time::Duration;
 use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, TableDefinition};
 
 pub use filter::Filter;
+pub use segment::PixelReader;
 #[doc(hidden)]
 pub use segment::Segment;
 
@@ -240,13 +241,13 @@ impl Journal {
         self.pixels.values_mut().try_for_each(Segment::sync).map_err(|error| failed(&folder, "store pixels", &error))
     }
 
-    /// The pixels of an attempt, checked against their hash.
+    /// A reader of a job's pixels that are stored by now.
     ///
     /// # Errors
-    /// When they are not there, or are not what was stored.
-    pub fn read_pixels(&mut self, job: JobId, lease: LeaseId) -> Result<Vec<u8>> {
-        let folder = self.folder.clone();
-        self.segment(job)?.read(lease).map_err(|error| failed(&folder, &format!("read the pixels of lease {}", lease.0), &error))
+    /// When the segment cannot be read.
+    pub fn reader(&mut self, job: JobId) -> Result<PixelReader> {
+        let path = self.path(job);
+        self.segment(job)?.reader(&path).map_err(|error| failed(&path, "read pixels", &error))
     }
 
     /// Attempts of a job whose pixels are on disk, with their parts.

@@ -64,7 +64,7 @@ impl Segment {
             return Ok(());
         }
         let length = bytes.len() as u64;
-        let hash = checksum(part, lease, bytes);
+        let hash = checksum(part, lease, length, &mut &*bytes)?;
         let mut header = Vec::with_capacity(HEADER_BYTES);
         header.extend(MAGIC);
         header.extend(part.0.to_le_bytes());
@@ -89,19 +89,51 @@ impl Segment {
         Ok(())
     }
 
-    pub fn read(&mut self, lease: LeaseId) -> io::Result<Vec<u8>> {
-        let record = *self.index.get(&lease).ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "they are not there"))?;
-        let mut bytes = vec![0; record.length as usize];
-        self.file.seek(SeekFrom::Start(record.at))?;
-        self.file.read_exact(&mut bytes)?;
-        if checksum(record.part, lease, &bytes) != record.hash {
-            return Err(io::Error::new(io::ErrorKind::InvalidData, "they are not what was stored (the disk changed them)"));
-        }
-        Ok(bytes)
+    /// A reader of what is in the segment by now.
+    pub fn reader(&self, path: &Path) -> io::Result<PixelReader> {
+        Ok(PixelReader { file: File::open(path)?, index: self.index.clone() })
     }
 
     pub fn stored(&self) -> Vec<(LeaseId, PartId)> {
         self.index.iter().map(|(lease, record)| (*lease, record.part)).collect()
+    }
+}
+
+/// Reads pixels of a job, while others may be stored.
+pub struct PixelReader {
+    file: File,
+    index: BTreeMap<LeaseId, Record>,
+}
+
+impl PixelReader {
+    /// Reads all pixels of an attempt once, without keeping them, and says how many bytes they are.
+    ///
+    /// # Errors
+    /// When they are not there, or are not what was stored.
+    pub fn check(&mut self, lease: LeaseId) -> io::Result<u64> {
+        let record = self.record(lease)?;
+        self.file.seek(SeekFrom::Start(record.at))?;
+        if checksum(record.part, lease, record.length, &mut self.file)? != record.hash {
+            return Err(io::Error::new(io::ErrorKind::InvalidData, "they are not what was stored (the disk changed them)"));
+        }
+        Ok(record.length)
+    }
+
+    /// Reads the bytes of an attempt's pixels from `offset` on.
+    ///
+    /// # Errors
+    /// When there are not so many.
+    pub fn read(&mut self, lease: LeaseId, offset: u64, bytes: &mut [u8]) -> io::Result<()> {
+        let record = self.record(lease)?;
+        if offset.saturating_add(bytes.len() as u64) > record.length {
+            return Err(io::ErrorKind::UnexpectedEof.into());
+        }
+        self.file.seek(SeekFrom::Start(record.at + offset))?;
+        self.file.read_exact(bytes)
+    }
+
+    fn record(&self, lease: LeaseId) -> io::Result<Record> {
+        self.index.get(&lease).copied().ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "they are not there"))
     }
 }
 
@@ -120,17 +152,18 @@ fn next_record(reader: &mut impl Read, at: u64, end: u64) -> io::Result<Option<(
     }
     let mut hash = [0; 32];
     hash.copy_from_slice(&header[24..]);
-    let mut bytes = vec![0; length as usize];
-    reader.read_exact(&mut bytes)?;
-    let whole = checksum(part, lease, &bytes) == hash;
+    let whole = checksum(part, lease, length, reader)? == hash;
     Ok(whole.then_some((lease, Record { part, at, length, hash })))
 }
 
-fn checksum(part: PartId, lease: LeaseId, bytes: &[u8]) -> [u8; 32] {
+/// The hash of a record whose bytes come from `bytes`.
+fn checksum(part: PartId, lease: LeaseId, length: u64, bytes: &mut impl Read) -> io::Result<[u8; 32]> {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&part.0.to_le_bytes());
     hasher.update(&lease.0.to_le_bytes());
-    hasher.update(&(bytes.len() as u64).to_le_bytes());
-    hasher.update(bytes);
-    *hasher.finalize().as_bytes()
+    hasher.update(&length.to_le_bytes());
+    if io::copy(&mut bytes.take(length), &mut hasher)? < length {
+        return Err(io::ErrorKind::UnexpectedEof.into());
+    }
+    Ok(*hasher.finalize().as_bytes())
 }

@@ -10,6 +10,7 @@ use quinn::{
         rustls::{QuicClientConfig, QuicServerConfig},
     },
 };
+use rustix::net::sockopt;
 use rustls::{RootCertStore, crypto::ring, server::WebPkiClientVerifier};
 
 use super::{
@@ -21,7 +22,7 @@ use crate::{
     error::{Error, ExitCode, Result},
     limits::{
         FIRST_STREAMS, FIRST_WINDOW_BYTES, IDLE_TIMEOUT, KEEP_ALIVE, OVERTAKING_PACKETS, OVERTAKING_TIME, RECEIVE_WINDOW_BYTES,
-        STREAM_WINDOW_BYTES, STREAMS_PER_PEER,
+        SOCKET_BYTES, STREAM_WINDOW_BYTES, STREAMS_PER_PEER,
     },
 };
 
@@ -49,7 +50,18 @@ pub fn server(address: SocketAddr, identity: &Identity, strangers: bool) -> Resu
         Error::new(ExitCode::Farm, format!("cannot listen on {address}: {error}"))
             .with_help("another program has this port: end it, or choose another one with --listen")
     })?;
+    make_room(&socket);
     endpoint(lasting(identity), Some(config), socket)
+}
+
+/// Makes room for what many peers send at once: packets that find none are lost, and come again only after a while.
+fn make_room(socket: &std::net::UdpSocket) {
+    // Beyond the system's own bound where this process may; else up to that.
+    let _ = sockopt::set_socket_recv_buffer_size_force(socket, SOCKET_BYTES)
+        .or_else(|_| sockopt::set_socket_recv_buffer_size(socket, SOCKET_BYTES));
+    if let Some(bytes) = sockopt::socket_recv_buffer_size(socket).ok().filter(|&bytes| bytes < SOCKET_BYTES) {
+        tracing::info!(bytes, "little room for incoming packets: a farm of hundreds of nodes needs `sysctl net.core.rmem_max={SOCKET_BYTES}`");
+    }
 }
 
 /// An endpoint that connects, with this identity.

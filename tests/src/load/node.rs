@@ -19,7 +19,7 @@ use tessera_node::{
 };
 use tokio::{
     sync::mpsc,
-    time::{Instant, MissedTickBehavior, interval_at, sleep_until},
+    time::{Instant, MissedTickBehavior, interval_at, sleep, sleep_until},
 };
 
 use super::{noise, tally::Tally};
@@ -52,16 +52,29 @@ struct Node {
     share: f64,
 }
 
-/// Lives until its connection ends. `share` in [0, 1) tells the node's place among all.
+/// Lives, and begins a new life where a connection ends. `share` in [0, 1) tells the node's place among all.
 pub async fn live(identity: Identity, coordinator: SocketAddr, share: f64, canary: Canary, tally: Arc<Tally>) {
     // All at once would be more handshakes than a coordinator lets begin at once.
-    tokio::time::sleep(Duration::from_secs_f64(share * 5.0)).await;
+    sleep(Duration::from_secs_f64(share * 5.0)).await;
     let endpoint = wire::client(&identity, coordinator).expect("a socket");
-    let connection = wire::connect(&endpoint, coordinator).await.expect("a connection");
+    loop {
+        let reason = match wire::connect(&endpoint, coordinator).await {
+            Ok(connection) => live_once(connection, share, canary.clone(), tally.clone()).await,
+            Err(error) => error.to_string(),
+        };
+        tally.note_end(reason);
+        sleep(Duration::from_secs(1)).await;
+    }
+}
+
+/// Lives until the connection ends, and says why it did.
+async fn live_once(connection: Connection, share: f64, canary: Canary, tally: Arc<Tally>) -> String {
     let incarnation = Incarnation(random());
-    let (mut say, mut receive) = connection.open_bi().await.expect("a stream");
-    let hello = Hello { incarnation, lanes: 1, build: "load".to_owned(), revision: REVISION };
-    wire::write(&mut say, &NodeStream::Control(hello), HELLO_BYTES).await.expect("a hello");
+    let hello = NodeStream::Control(Hello { incarnation, lanes: 1, build: "load".to_owned(), revision: REVISION });
+    let Ok((mut say, mut receive)) = connection.open_bi().await else { return "no stream".to_owned() };
+    if let Err(error) = wire::write(&mut say, &hello, HELLO_BYTES).await {
+        return error.to_string();
+    }
     let (heard, messages) = mpsc::channel(256);
     tokio::spawn(async move {
         while let Ok(message) = wire::read::<ToNode>(&mut receive, CONTROL_BYTES).await {
@@ -71,10 +84,14 @@ pub async fn live(identity: Identity, coordinator: SocketAddr, share: f64, canar
         }
     });
     let (frames, queue, waiting) = (BTreeMap::new(), VecDeque::new(), BTreeMap::new());
-    let node = Node { connection, say, canary, tally: tally.clone(), frames, queue, done: Instant::now(), waiting, share };
+    let done = Instant::now();
+    let node = Node { connection: connection.clone(), say, canary, tally: tally.clone(), frames, queue, done, waiting, share };
     tally.count_connected();
     node.work(incarnation, messages).await;
     tally.count_gone();
+    let reason = connection.close_reason().map_or_else(|| "it stopped talking".to_owned(), |reason| wire::explain(&reason).to_string());
+    connection.close(0_u8.into(), b"");
+    reason
 }
 
 impl Node {

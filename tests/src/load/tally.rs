@@ -17,6 +17,7 @@ pub struct Tally {
     settled: AtomicU64,
     micros: AtomicU64,
     waits: Mutex<Vec<f64>>,
+    ends: Mutex<Vec<String>>,
 }
 
 impl Tally {
@@ -62,6 +63,15 @@ impl Tally {
         let mut waits = std::mem::take(&mut *self.waits());
         waits.sort_by(f64::total_cmp);
         waits
+    }
+
+    /// Why connections ended, or did not come to stand.
+    pub fn ends(&self) -> Vec<String> {
+        self.ends.lock().expect("no panic").clone()
+    }
+
+    pub(super) fn note_end(&self, reason: String) {
+        self.ends.lock().expect("no panic").push(reason);
     }
 
     fn waits(&self) -> MutexGuard<'_, Vec<f64>> {
