@@ -334,8 +334,8 @@ pub const POLICY_PATIENCE: Duration = SCRIPT_TIME.saturating_add(POLICY_TIMEOUT)
 
 // ---- Parts -------------------------------------------------------------------------------------------------------------
 
-/// Parts of one job at the most.
-pub const PARTS_PER_JOB: usize = 200_000;
+/// Parts of one job at the most: a frame of 32,768 x 32,768 pixels in parts of 64 x 64, and room for those that are cut up.
+pub const PARTS_PER_JOB: usize = 300_000;
 
 /// Failures of a part, each on another node where there is one, after which it is cut up or left out, if the job does not say otherwise.
 pub const ATTEMPTS_PER_PART: u32 = 3;

@@ -4,11 +4,7 @@ use std::io;
 
 use tessera_engine::{output::Rows, part::Rect};
 
-use crate::{
-    farm::LeaseId,
-    journal::PixelReader,
-    schedule::PartId,
-};
+use crate::{farm::LeaseId, journal::PixelReader, schedule::PartId};
 
 /// A part on disk.
 struct Piece {
@@ -147,9 +143,8 @@ mod tests {
 
     fn layouts() -> Vec<Vec<Rect>> {
         let columns = (0..SIZE.0).step_by(5).map(|x| rect(x, 0, 5.min(SIZE.0 - x), SIZE.1)).collect();
-        let grid = (0..SIZE.1).step_by(32).flat_map(|y| {
-            (0..SIZE.0).step_by(32).map(move |x| rect(x, y, 32.min(SIZE.0 - x), 32.min(SIZE.1 - y)))
-        });
+        let grid =
+            (0..SIZE.1).step_by(32).flat_map(|y| (0..SIZE.0).step_by(32).map(move |x| rect(x, y, 32.min(SIZE.0 - x), 32.min(SIZE.1 - y))));
         let mut ragged = vec![rect(60, 1, 23, 69), rect(0, 0, 60, 1), rect(0, 17, 31, 53), rect(60, 0, 23, 1), rect(31, 1, 29, 16)];
         ragged.extend([rect(0, 1, 31, 16), rect(31, 49, 29, 21)]); // and a hole between
         vec![columns, grid.collect(), ragged, vec![rect(0, 0, SIZE.0, SIZE.1)], Vec::new()]

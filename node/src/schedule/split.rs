@@ -190,7 +190,7 @@ mod tests {
         );
         assert_eq!(says(&[rect(0, 0, 10, 5), rect(0, 5, 3, 5), rect(4, 5, 6, 5)]), "no rectangle covers the pixel x = 3, y = 5");
         assert_eq!(says(&[rect(0, 0, 10, 5)]), "no rectangle covers the pixel x = 0, y = 5");
-        assert_eq!(says(&vec![rect(0, 0, 1, 1); PARTS_PER_JOB + 1]), "the split has 200001 rectangles; 200000 are the most");
+        assert_eq!(says(&vec![rect(0, 0, 1, 1); PARTS_PER_JOB + 1]), "the split has 300001 rectangles; 300000 are the most");
     }
 
     #[test]

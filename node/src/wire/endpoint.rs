@@ -60,7 +60,10 @@ fn make_room(socket: &std::net::UdpSocket) {
     let _ = sockopt::set_socket_recv_buffer_size_force(socket, SOCKET_BYTES)
         .or_else(|_| sockopt::set_socket_recv_buffer_size(socket, SOCKET_BYTES));
     if let Some(bytes) = sockopt::socket_recv_buffer_size(socket).ok().filter(|&bytes| bytes < SOCKET_BYTES) {
-        tracing::info!(bytes, "little room for incoming packets: a farm of hundreds of nodes needs `sysctl net.core.rmem_max={SOCKET_BYTES}`");
+        tracing::info!(
+            bytes,
+            "little room for incoming packets: a farm of hundreds of nodes needs `sysctl net.core.rmem_max={SOCKET_BYTES}`"
+        );
     }
 }
 
