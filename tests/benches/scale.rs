@@ -55,7 +55,8 @@ impl Bench {
     fn measure(&mut self, seconds: f64) -> Stretch {
         let (beats, settled) = (self.fleet.tally.beats(), self.fleet.tally.settled());
         drop(self.fleet.tally.take_waits());
-        (self.meter.look(), self.own.look());
+        self.meter.look();
+        self.own.look();
         thread::sleep(Duration::from_secs_f64(seconds));
         let (usage, own) = (self.meter.look(), self.own.look().cores);
         let rate = |now: u64, before: u64| (now - before) as f64 / usage.seconds;

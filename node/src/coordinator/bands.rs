@@ -121,7 +121,7 @@ mod tests {
 
     /// Pixels that tell their own place; some are beyond half floats.
     fn part(rect: Rect) -> RenderedPart {
-        let pixel = |x: u32, y: u32| [x as f32 * 0.37, 1.0 / (y + 1) as f32, if (x + y) % 7 == 0 { 1e9 } else { 0.5 }];
+        let pixel = |x: u32, y: u32| [x as f32 * 0.37, 1.0 / (y + 1) as f32, if (x + y).is_multiple_of(7) { 1e9 } else { 0.5 }];
         let pixels = (rect.y..rect.y + rect.height).flat_map(|y| (rect.x..rect.x + rect.width).map(move |x| pixel(x, y))).collect();
         RenderedPart { rect, pixels, counters: Counters::default() }
     }
