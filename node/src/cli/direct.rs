@@ -6,7 +6,7 @@ use tessera_engine::{part::Rect, scene::Scene};
 
 use super::here;
 use crate::{
-    coordinator::write_pictures,
+    coordinator::{identity, write_pictures},
     error::{Error, ExitCode, Result},
     job::{JobDescription, Policies},
     limits::POLICY_TIMEOUT,
@@ -20,7 +20,8 @@ use crate::{
 pub fn render(description: &JobDescription, scene: &Scene, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
     let parts = parts(description, threads)?;
     let film = here::parts(scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
-    write_pictures(description, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;
+    write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
     Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())
 }
 

@@ -26,7 +26,10 @@ use crate::{
     report::lined_up,
     schedule::NodeId,
     simulate::Random,
-    wire::tls::{Authority, Identity, Role},
+    wire::{
+        Terms,
+        tls::{Authority, Identity, Role},
+    },
 };
 
 /// Nodes of the farm, of one lane each.
@@ -176,7 +179,7 @@ impl RealFarm {
         while client.status().await?.nodes.iter().filter(|node| node.state == NodeState::Ready).count() < NODES {
             sleep(LOOK).await;
         }
-        let job = client.submit(&loaded.description, &loaded.assets, NODES as u32).await?;
+        let job = client.submit(&loaded.description, &loaded.assets, &Terms { min_nodes: NODES as u32, ..Terms::default() }).await?;
         loop {
             let status = client.status().await?;
             // A status that is older than the job does not know it yet.

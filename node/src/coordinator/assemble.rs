@@ -60,8 +60,13 @@ pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<ReportEntry, Refusa
 }
 
 fn write_files(assembly: &Assembly, picture: &mut Bands) -> Result<ReportEntry, String> {
-    let image = write_pictures(&assembly.stored.description, picture, &assembly.holes, &assembly.files)?;
     let Assembly { job, stored, record, .. } = assembly;
+    // Whoever puts the picture together may be of a later build than those who rendered it.
+    let mut identity = identity(&stored.description)?;
+    if record.build.is_some_and(|build| build.revision == stored.revision) {
+        (identity.image_hash, identity.engine_revision) = (stored.image_hash.clone(), stored.revision);
+    }
+    let image = write_pictures(&stored.description, &identity, picture, &assembly.holes, &assembly.files)?;
     let submission = Submission {
         id: job.0,
         name: stored.description.name.clone(),
@@ -75,20 +80,34 @@ fn write_files(assembly: &Assembly, picture: &mut Bands) -> Result<ReportEntry, 
     Ok(manifest.report)
 }
 
+/// What the picture of a job is called, if this build renders it.
+///
+/// # Errors
+/// In words, when its description cannot be coded.
+pub fn identity(description: &JobDescription) -> Result<exr::Identity, String> {
+    let hash = description.frame.hash().map_err(|error| error.to_string())?;
+    Ok(exr::Identity::new(hash, description.frame.seed))
+}
+
 /// Writes the EXR and the preview into a folder, and says what there is to know of them. Holes are black in the one, and marked in the other.
 ///
 /// # Errors
 /// In words, when the disk refuses.
-pub fn write_pictures(description: &JobDescription, mut picture: impl Rows, holes: &[Rect], folder: &Path) -> Result<ImageEntry, String> {
+pub fn write_pictures(
+    description: &JobDescription,
+    identity: &exr::Identity,
+    mut picture: impl Rows,
+    holes: &[Rect],
+    folder: &Path,
+) -> Result<ImageEntry, String> {
     let JobDescription { frame, output, .. } = description;
-    let hash = frame.hash().map_err(|error| error.to_string())?;
     let (written, noted) = match output.pixel_type {
         PixelType::Float => (exr::PixelType::Float, manifest::PixelType::Float),
         PixelType::Half => (exr::PixelType::Half, manifest::PixelType::Half),
     };
     let path = folder.join(&output.exr);
     let holes: Vec<[u32; 4]> = holes.iter().map(|hole| [hole.x, hole.y, hole.width, hole.height]).collect();
-    let identity = exr::Identity { holes: holes.clone(), ..exr::Identity::new(hash, frame.seed) };
+    let identity = exr::Identity { holes: holes.clone(), ..identity.clone() };
     let exr::Written { hash: pixels_hash, clamped } =
         exr::write(&path, &mut picture, written, &identity).map_err(|error| error.to_string())?;
     let (width, height) = picture.size();
@@ -102,7 +121,7 @@ pub fn write_pictures(description: &JobDescription, mut picture: impl Rows, hole
         height,
         samples: u64::from(frame.quality.samples),
         seed: frame.seed,
-        image_hash: hash.to_string(),
+        image_hash: identity.image_hash,
         pixel_type: noted,
         pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
         clamped,

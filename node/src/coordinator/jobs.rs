@@ -5,7 +5,7 @@ use std::{collections::BTreeMap, collections::BTreeSet, sync::Arc, thread, time:
 use tokio::sync::oneshot;
 
 use super::{
-    assemble::{self, Assembly, Refusal},
+    assemble::{self, Assembly, Refusal, identity},
     core::Core,
     input::Input,
     kept::{End, seconds_now},
@@ -73,7 +73,8 @@ impl Core {
         let frame = self.shared.store.put(&frame).map_err(|error| words(&error))?;
         let submitted = seconds_now();
         let spec = submission::spec(&description, &terms, owner);
-        let stored = StoredJob { description, frame, submitted };
+        let identity = identity(&description)?;
+        let stored = StoredJob { description, frame, submitted, image_hash: identity.image_hash, revision: identity.engine_revision };
         self.shared.store.put_job(job, &stored, owner).map_err(|error| words(&error))?;
         tracing::info!(job = job.0, name = stored.description.name, owner, "a job was submitted");
         self.jobs.insert(job, Known::new(stored));

@@ -35,7 +35,10 @@ use tokio::{
     task::JoinHandle,
 };
 
-pub use self::{assemble::write_pictures, retention::Retention};
+pub use self::{
+    assemble::{identity, write_pictures},
+    retention::Retention,
+};
 use self::{
     canary::Canary,
     core::Core,

@@ -38,6 +38,11 @@ pub struct StoredJob {
     pub frame: AssetId,
     /// Moment of submission, in seconds since 1970.
     pub submitted: u64,
+    /// The frame's hash and the engine's revision of the coordinator that took it: where a later one ends the job on nodes of that build, the picture
+    /// is called after those.
+    pub image_hash: String,
+    /// See [`Self::image_hash`].
+    pub revision: u32,
 }
 
 /// The folder.

@@ -6,7 +6,8 @@ use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
     limits::{
-        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY, SAMPLES_PER_PIXEL,
+        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY,
+        SAMPLES_PER_PIXEL,
     },
     schedule::{Probe, Split},
     wire::{self, Terms},

@@ -60,7 +60,8 @@ fn main() {
         other => panic!("no fault {other}"),
     };
     let identity = Identity::load(Path::new(keys), Role::Node).expect("the keys of a node");
-    let options = Options { coordinator: coordinator.clone(), identity, lanes: 1, cache: None, cache_bytes: CACHE_BYTES, drain: DRAIN_LIMIT, render };
+    let options =
+        Options { coordinator: coordinator.clone(), identity, lanes: 1, cache: None, cache_bytes: CACHE_BYTES, drain: DRAIN_LIMIT, render };
     let (_never, told) = watch::channel(0);
     worker::run(&options, told).expect("a node that starts");
 }

@@ -5,8 +5,8 @@ use std::{fs, panic, sync::LazyLock, time::Duration};
 use tessera_node::{
     farm::{Event, Farm, FarmConfig, JobId, JobSpec, LeaseId},
     journal::{Journal, Segment},
-    limits::{PIXELS_PER_FRAME, SAMPLES_PER_PIXEL},
-    schedule::{Assign, PartId, Probe, Split},
+    limits::{LONGEST_PATIENCE, PIXELS_PER_FRAME, SAMPLES_PER_PIXEL},
+    schedule::{PartId, Probe, Split},
 };
 
 /// A segment of pixels: what it says to be stored can be read, and it goes on behind that.
@@ -18,22 +18,19 @@ pub fn segment(bytes: &[u8]) -> bool {
     let mut segment = Segment::open(&path).unwrap();
     let stored = segment.stored();
     assert!(fs::read(&path).unwrap().len() <= bytes.len());
-    stored.iter().for_each(|(lease, _)| drop(segment.read(*lease).unwrap()));
+    let mut reader = segment.reader(&path).unwrap();
+    stored.iter().for_each(|(lease, _)| assert!(reader.check(*lease).unwrap() <= bytes.len() as u64));
     segment.append(NEW.0, NEW.1, NEW.2).unwrap();
     segment.sync().unwrap();
-    let mut again = Segment::open(&path).unwrap();
+    let again = Segment::open(&path).unwrap();
     assert_eq!(again.stored().len(), stored.len() + usize::from(stored.iter().all(|(lease, _)| *lease != NEW.1)));
-    again.read(NEW.1).unwrap();
+    again.reader(&path).unwrap().check(NEW.1).unwrap();
     !stored.is_empty()
 }
 
 /// A job as a submission may tell of it.
 pub fn spec() -> JobSpec {
-    JobSpec {
-        probe: Probe::Shared { scale: 0.25 },
-        split: Split::Grid { width: 32, height: 32 },
-        ..JobSpec::plain("job", 64, 48, 4)
-    }
+    JobSpec { probe: Probe::Shared { scale: 0.25 }, split: Split::Grid { width: 32, height: 32 }, ..JobSpec::plain("job", 64, 48, 4) }
 }
 
 /// Events with their times, one after another: a farm takes them in whatever order, and its books agree after each.
@@ -61,6 +58,8 @@ fn is_possible(event: &Event) -> bool {
     (1..=PIXELS_PER_FRAME.min(1 << 14)).contains(&pixels)
         && (1..=u64::from(SAMPLES_PER_PIXEL)).contains(&spec.samples)
         && spec.min_nodes > 0
+        && spec.attempts > 0
+        && spec.patience.is_none_or(|patience| patience.as_secs_f64() <= LONGEST_PATIENCE)
 }
 
 /// The database's file as it is after three events.

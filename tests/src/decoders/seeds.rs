@@ -305,7 +305,7 @@ fn events(further: &[Event]) -> Vec<u8> {
 
 fn troubles() -> Vec<Event> {
     let (node, incarnation, job) = (NODE, LIFE, JOB);
-    let lease = LeaseId;
+    let lease = |number: u64| LeaseId((1 << 40) + number);
     vec![
         Event::Rendered { node, incarnation, job, lease: lease(1), hash: [1; 32], seconds: 0.1 },
         Event::Committed { job, lease: lease(1) },
@@ -315,7 +315,11 @@ fn troubles() -> Vec<Event> {
         Event::PolicyAnswered { id: PolicyId(1), answer: Ok(Answer::Split(vec![RECT])) },
         Event::NodeHeard { node, incarnation },
         Event::NodeLeft { node, incarnation, reason: "it is late".into() },
-        Event::Restarted,
+        Event::Restarted { build: Build { revision: 2, canary: [7; 32] } },
+        Event::JobPaused { job, reason: "by ann".into() },
+        Event::JobResumed { job, reason: "by ann".into() },
+        Event::JobRanked { job, priority: 7 },
+        Event::NodeDraining { node, incarnation },
         Event::NodeReleased { node },
         Event::JobCancelled { job, reason: "enough".into() },
         Event::Assembled { job, result: Ok(()) },
