@@ -10,7 +10,7 @@ use std::time::Duration;
 pub const HEARTBEAT_INTERVAL: Duration = Duration::from_millis(100);
 
 /// Silence after which a node is suspected and its parts are given to others.
-pub const SUSPECT_AFTER: Duration = Duration::from_millis(500);
+pub const SUSPECT_AFTER: Duration = Duration::from_millis(700);
 
 /// Silence after which a suspected node is declared dead: its incarnation is void from then on.
 pub const DEAD_AFTER: Duration = Duration::from_secs(10);
@@ -261,7 +261,7 @@ pub const REFUSAL_LOG_INTERVAL: Duration = Duration::from_secs(10);
 pub const COMPLAINT_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A node that was heard within this time lives: another process with its key is turned away.
-pub const TWIN_SILENCE: Duration = Duration::from_millis(200);
+pub const TWIN_SILENCE: Duration = Duration::from_millis(300);
 
 // ---- A job's beginning -------------------------------------------------------------------------------------------------
 

@@ -3,23 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::{cmp::Reverse, time::Duration};
 
-use super::machine::{Act, Node, Task, canary, true_hash};
+use super::machine::{Act, Node, Task, canary};
 use super::random::Random;
 use super::{Fault, Run, Scenario, ScriptPolicy};
-use crate::farm::{
-    Answer, Command, Event, Farm, Incarnation, JobId, JobRecord, JobSpec, LeaseId, NodeSnapshot, NodeState, Outcome, Question, ToNode,
-};
+use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, JobSpec, LeaseId, Outcome, Question, ToNode};
 use crate::journal::Filter;
 use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT, LATE_TICK};
-use crate::manifest::{AttemptOutcome, PartEntry};
 use crate::schedule::{NodeId, PartId, assign, split};
-use tessera_engine::part::Rect;
 
 /// The job that a run tells most of.
 const JOB: JobId = JobId(1);
-
-/// Parts beyond which the books are not checked after every step.
-const THICK: usize = 1_000;
 
 /// What happens at a moment.
 enum Happening {
@@ -46,11 +39,11 @@ enum Happening {
 
 /// A simulation while it runs.
 pub struct World {
-    scenario: Scenario,
+    pub(super) scenario: Scenario,
     random: Random,
-    farm: Farm,
-    nodes: Vec<Node>,
-    now: Duration,
+    pub(super) farm: Farm,
+    pub(super) nodes: Vec<Node>,
+    pub(super) now: Duration,
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
     epoch: u64,
@@ -68,9 +61,9 @@ pub struct World {
     revoked: BTreeSet<LeaseId>,
     /// Deliveries that the farm has to say something about.
     open: BTreeSet<LeaseId>,
-    killed: BTreeMap<usize, Duration>,
+    pub(super) killed: BTreeMap<usize, Duration>,
     trace: blake3::Hasher,
-    run: Run,
+    pub(super) run: Run,
 }
 
 impl World {
@@ -166,7 +159,7 @@ impl World {
         self.step(Event::Tick);
     }
 
-    fn violation(&mut self, what: impl Into<String>) {
+    pub(super) fn violation(&mut self, what: impl Into<String>) {
         self.run.violations.push(format!("at {:.3} s: {}", self.now.as_secs_f64(), what.into()));
     }
 
@@ -304,34 +297,6 @@ impl World {
         commands.into_iter().for_each(|command| self.carry_out(command));
     }
 
-    /// Checks the farm's books: after every step, or now and then where they are thick.
-    fn judge(&mut self) {
-        let parts = self.farm.jobs().iter().map(|job| job.parts).max().unwrap_or_default();
-        if !self.run.steps.is_multiple_of(1 + (parts / THICK) as u64) {
-            return;
-        }
-        if let Err(wrong) = self.farm.check_invariants() {
-            self.violation(wrong);
-        }
-        let innocent = |node: &NodeSnapshot| node.state == NodeState::Quarantined && !self.nodes[node.id.0 as usize].corrupt;
-        if self.farm.nodes().iter().any(innocent) {
-            self.violation("a node is in quarantine whose pixels are right");
-        }
-    }
-
-    fn note_detections(&mut self) {
-        if self.killed.is_empty() {
-            return;
-        }
-        for node in self.farm.nodes() {
-            if matches!(node.state, NodeState::Suspected | NodeState::Lost)
-                && let Some(at) = self.killed.remove(&(node.id.0 as usize))
-            {
-                self.run.detections.push(self.now - at);
-            }
-        }
-    }
-
     fn carry_out(&mut self, command: Command) {
         match command {
             Command::Send { node, incarnation, message } => self.send(node, incarnation, message),
@@ -426,27 +391,6 @@ impl World {
             None => Event::Assembled { job, result: Ok(()) },
         };
         self.plan(at, Happening::Farm(event, self.epoch));
-    }
-
-    /// All pixels are of the build that the job began on, but for those of nodes that compute wrongly; and where every part was compared, there are none
-    /// of those.
-    fn judge_pixels(&mut self, job: JobId, record: &JobRecord) {
-        let build = record.build.map_or(0, |build| build.revision);
-        let alone = |warning: &String| warning.contains("there is no third to decide") || warning.contains("no other node was there");
-        let compared = record.spec.audit >= 1.0 && !record.warnings.iter().any(alone);
-        let excused = |part: &PartEntry| {
-            let by = part.attempts.iter().find(|attempt| attempt.outcome == AttemptOutcome::Committed);
-            !compared && by.is_some_and(|attempt| self.nodes[attempt.node.0 as usize].corrupt)
-        };
-        let wrong = record.parts.iter().find(|part| {
-            let [x, y, width, height] = part.rect;
-            let right = true_hash(job, build, Rect { x, y, width, height });
-            let right: String = right.iter().map(|byte| format!("{byte:02x}")).collect();
-            part.hash.as_ref().is_some_and(|hash| *hash != right) && !excused(part)
-        });
-        if let Some(part) = wrong {
-            self.violation(format!("part {} of job {} has wrong pixels", part.id.0, job.0));
-        }
     }
 
     fn start(&mut self, node: usize) {

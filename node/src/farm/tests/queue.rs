@@ -44,6 +44,7 @@ impl Bench {
         let (node, lease) = self.running(job)[0];
         let job = JobId(job);
         self.does(Event::Rendered { node, incarnation: Incarnation(1), job, lease, hash: [3; 32], seconds: 1.0 });
+        self.prepare();
         self.does(Event::Committed { job, lease });
         self.prepare();
     }
