@@ -174,7 +174,7 @@ impl Job {
             Phase::Probing(probing) => probing.deadline,
             _ => None,
         };
-        let deserted = self.deserted.map(|since| since + config.no_node_timeout);
+        let deserted = self.deserted.map(|since| since + self.patience(config));
         let question = self.question.as_ref().map(|question| question.deadline);
         preparing.chain(phase).chain(deserted).chain(question).chain(self.reconsider).chain(self.next_due).min()
     }

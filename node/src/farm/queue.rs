@@ -19,6 +19,8 @@ use crate::manifest::EventKind;
 pub(super) struct Queue {
     /// Jobs that have begun and are not over.
     pub open: BTreeSet<JobId>,
+    /// Jobs that have not begun, and perhaps ended before they could.
+    waiting: BTreeSet<JobId>,
     /// Cost that was handed out to each submitter who has open jobs.
     had: BTreeMap<String, f64>,
     /// Open jobs that have work for all lanes, as it was when the queue was last looked at.
@@ -34,6 +36,7 @@ impl Farm {
         }
         let waiting = self.jobs.values().filter(|job| job.outcome().is_none()).count();
         self.jobs.insert(id, Job::new(id, spec, self.turn.now));
+        self.queue.waiting.insert(id);
         self.queue.stale = true;
         if waiting >= JOBS_WAITING {
             let reason = format!("{JOBS_WAITING} jobs wait already");
@@ -59,8 +62,7 @@ impl Farm {
 
     /// Jobs that are over are known for a while: the oldest go, but those that others wait for.
     fn forget_jobs(&mut self) {
-        let awaited: BTreeSet<JobId> =
-            self.jobs.values().filter(|job| job.phase == Phase::Waiting).flat_map(|job| job.spec.after.iter().copied()).collect();
+        let awaited: BTreeSet<JobId> = self.waiting_jobs().flat_map(|job| job.spec.after.iter().copied()).collect();
         let over: Vec<JobId> = self.jobs.values().filter(|job| job.outcome().is_some()).map(|job| job.id).collect();
         let old = over.iter().take(over.len().saturating_sub(JOBS_KEPT));
         old.filter(|id| !awaited.contains(id)).for_each(|id| _ = self.jobs.remove(id));
@@ -130,6 +132,7 @@ impl Farm {
         let over = |id: &JobId| self.jobs.get(id).is_none_or(|job| job.outcome().is_some());
         let ended: Vec<JobId> = self.queue.open.iter().copied().filter(over).collect();
         ended.iter().for_each(|id| _ = self.queue.open.remove(id));
+        self.queue.waiting.retain(|id| self.jobs.get(id).is_some_and(|job| job.phase == Phase::Waiting));
         let owners: BTreeSet<&String> = self.open_jobs().map(|job| &job.spec.owner).collect();
         let had = self.queue.had.iter().filter(|(owner, _)| owners.contains(owner)).map(|(owner, had)| (owner.clone(), *had)).collect();
         self.queue.had = had;
@@ -141,8 +144,15 @@ impl Farm {
         self.queue.open.iter().filter_map(|id| self.jobs.get(id))
     }
 
+    fn waiting_jobs(&self) -> impl Iterator<Item = &Job> {
+        self.queue.waiting.iter().filter_map(|id| self.jobs.get(id)).filter(|job| job.phase == Phase::Waiting)
+    }
+
     /// Begins the job whose turn it is, if there is one. Says whether anything has changed.
     fn begin_next(&mut self) -> bool {
+        if self.queue.waiting.is_empty() {
+            return false;
+        }
         let lanes: usize = self.nodes.values().filter(|node| node.is_ready()).map(|node| node.lanes()).sum();
         let busy: BTreeSet<JobId> = self.open_jobs().filter(|job| job.is_busy(lanes)).map(|job| job.id).collect();
         if !self.queue.stale && busy == self.queue.busy {
@@ -163,8 +173,7 @@ impl Farm {
 
     /// Fails a job that waits for one that came to no good end.
     fn fail_orphans(&mut self) -> bool {
-        let waiting = self.jobs.values().filter(|job| job.phase == Phase::Waiting);
-        let orphan = waiting.filter_map(|job| Some((job.id, self.trouble_ahead(job)?))).next();
+        let orphan = self.waiting_jobs().filter_map(|job| Some((job.id, self.trouble_ahead(job)?))).next();
         let Some((id, reason)) = orphan else { return false };
         self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason }));
         self.note_ends();
@@ -186,8 +195,7 @@ impl Farm {
         if self.queue.open.len() >= JOBS_AT_ONCE {
             return None;
         }
-        let waiting = self.jobs.values().filter(|job| job.phase == Phase::Waiting && !job.paused);
-        let due = waiting.filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
+        let due = self.waiting_jobs().filter(|job| !job.paused).filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
         due.filter(|job| !self.is_held_back(job)).map(|job| job.id).min_by(|a, b| self.compare_claims(*a, *b))
     }
 
@@ -203,6 +211,7 @@ impl Farm {
     /// A job's submitter is taken to have had as much as the one who has had least of those who are there.
     fn join_queue(&mut self, id: JobId) {
         self.queue.open.insert(id);
+        self.queue.waiting.remove(&id);
         let Some(owner) = self.jobs.get(&id).map(|job| job.spec.owner.clone()) else { return };
         let least = self.queue.had.values().copied().min_by(f64::total_cmp).unwrap_or_default();
         self.queue.had.entry(owner).or_insert(least);

@@ -223,6 +223,7 @@ impl Scenario {
             let mut job = JobSpec { owner: ["one", "two", "three"][random.below(3) as usize].into(), ..self.job.clone() };
             job.priority = [0, 0, 0, 10, -10][random.below(5) as usize];
             job.name = format!("simulated {number}");
+            job.patience = random.happens(0.2).then(|| random.seconds(61.0, 200.0));
             if random.happens(0.2) {
                 job.after = vec![JobId(number - 1)];
             }
