@@ -288,7 +288,7 @@ pub const NODES: usize = 20_000;
 /// Jobs that wait or run.
 pub const JOBS_WAITING: usize = 4_000;
 
-/// Jobs that have begun and are not over: nodes hold their scenes in memory.
+/// Jobs that have begun, are not over and do not wait for anything; and all of one submitter that have begun: nodes hold their scenes in memory.
 pub const JOBS_AT_ONCE: usize = 8;
 
 /// Where submitters share: a job hands out one part in its turn, and one more for so many nodes.

@@ -60,6 +60,13 @@ pub(super) struct Member {
 }
 
 impl Member {
+    /// Takes a part out of its queue: one near either end, as a rule.
+    pub fn take_out(&mut self, part: PartId) {
+        if let Some(at) = self.queue.iter().position(|queued| *queued == part) {
+            self.queue.remove(at);
+        }
+    }
+
     /// Throughput, once it is known (see [`crate::schedule::evaluate`]).
     pub fn power(&self) -> Option<f64> {
         self.speed.map(|speed| speed * f64::from(self.info.lanes.max(1)))

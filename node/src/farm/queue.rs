@@ -192,11 +192,16 @@ impl Farm {
 
     /// The waiting job with the first claim that nothing holds back.
     fn next_to_begin(&self) -> Option<JobId> {
-        if self.queue.open.len() >= JOBS_AT_ONCE {
+        // Who lets jobs wait holds up nobody but themselves.
+        if self.open_jobs().filter(|job| job.is_active()).count() >= JOBS_AT_ONCE {
             return None;
         }
-        let due = self.waiting_jobs().filter(|job| !job.paused).filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
-        due.filter(|job| !self.is_held_back(job)).map(|job| job.id).min_by(|a, b| self.compare_claims(*a, *b))
+        let own = |job: &Job| self.open_jobs().filter(|other| other.spec.owner == job.spec.owner).count();
+        let due = self
+            .waiting_jobs()
+            .filter(|job| !job.paused)
+            .filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
+        due.filter(|job| own(job) < JOBS_AT_ONCE && !self.is_held_back(job)).map(|job| job.id).min_by(|a, b| self.compare_claims(*a, *b))
     }
 
     /// Whether another job has work for all lanes, and a claim before this one. Submitters of equal priority run side by side.
@@ -221,7 +226,7 @@ impl Farm {
 impl Job {
     /// Whether it has work, or will soon have, for more lanes than the farm has.
     fn is_busy(&self, lanes: usize) -> bool {
-        if self.paused || self.deserted.is_some() {
+        if !self.is_active() {
             return false;
         }
         match self.phase {
@@ -229,6 +234,11 @@ impl Job {
             Phase::Gathering(_) | Phase::Probing(_) | Phase::Splitting | Phase::Assigning => true,
             Phase::Rendering => self.waiting_parts() > lanes,
         }
+    }
+
+    /// Whether it uses nodes, or would if it could.
+    fn is_active(&self) -> bool {
+        !self.paused && self.deserted.is_none()
     }
 
     /// Nothing of it is handed out any more; what nodes hold they finish.

@@ -96,7 +96,7 @@ impl Job {
         if let Place::Queued(node) = self.part(part).place
             && let Some(member) = self.members.get_mut(&node)
         {
-            member.queue.retain(|queued| *queued != part);
+            member.take_out(part);
         }
         self.part_mut(part).place = Place::Loose;
         self.loose.insert(part);

@@ -110,7 +110,7 @@ impl Job {
             self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "another node was free");
         }
         if let Some(member) = self.members.get_mut(&from) {
-            member.queue.retain(|queued| *queued != part);
+            member.take_out(part);
         }
     }
 
