@@ -116,8 +116,10 @@ fn jobs_are_ranked_paused_resumed_and_wait_for_each_other() {
 fn a_node_that_is_told_to_end_hands_in_what_it_renders() {
     let farm = Farm::new();
     let (one, _two) = (farm.program.node(&farm.address, "keys/node-one.pem"), farm.program.node(&farm.address, "keys/node-two.pem"));
-    let job = farm.submit(&["--set", "samples=1024", "--min-nodes", "2"]);
-    farm.wait_for_job(&job, |job| job["committed"].as_u64().is_some_and(|committed| committed >= 6));
+    let job = farm.submit(&["--set", "samples=256", "--min-nodes", "2"]);
+    farm.program.wait_for_status(&farm.address, "keys/operator-operator.pem", |status| {
+        status["nodes"].as_array().is_some_and(|nodes| nodes.iter().any(|node| node["name"] == "one" && node["holds"].as_u64() > Some(0)))
+    });
     signal(one.pid(), Signal::TERM);
     let ended = one.finish();
     assert_eq!(ended.code, Some(0), "{}", ended.errors);
