@@ -79,7 +79,7 @@ impl Farm {
     /// Waits until a job is as wanted.
     fn wait_for_job(&self, job: &str, wanted: impl Fn(&serde_json::Value) -> bool) {
         self.program.wait_for_status(&self.address, "keys/operator-operator.pem", |status| {
-            status["jobs"].as_array().is_some_and(|jobs| jobs.iter().any(|known| known["job"].to_string() == job && wanted(known)))
+            status["jobs"].as_array().is_some_and(|jobs| jobs.iter().any(|known| known["job"].as_u64() == job.parse().ok() && wanted(known)))
         });
     }
 }
