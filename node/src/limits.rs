@@ -288,6 +288,9 @@ pub const NODES: usize = 20_000;
 /// Jobs that wait or run.
 pub const JOBS_WAITING: usize = 4_000;
 
+/// How many of them are for operators alone.
+pub const JOBS_FOR_OPERATORS: usize = 500;
+
 /// Jobs that have begun, are not over and do not wait for anything; and all of one submitter that have begun: nodes hold their scenes in memory.
 pub const JOBS_AT_ONCE: usize = 8;
 
@@ -304,7 +307,7 @@ pub const FRAMES_PER_SEQUENCE: usize = 2_000;
 pub const LONGEST_PATIENCE: f64 = 365.0 * 86_400.0;
 
 /// Jobs that one job waits for.
-pub const JOBS_AWAITED: usize = 1_000;
+pub const JOBS_AWAITED: usize = 64;
 
 /// Jobs that are over and still known.
 pub const JOBS_KEPT: usize = 1_000;

@@ -79,7 +79,9 @@ impl Farm {
     /// Waits until a job is as wanted.
     fn wait_for_job(&self, job: &str, wanted: impl Fn(&serde_json::Value) -> bool) {
         self.program.wait_for_status(&self.address, "keys/operator-operator.pem", |status| {
-            status["jobs"].as_array().is_some_and(|jobs| jobs.iter().any(|known| known["job"].as_u64() == job.parse().ok() && wanted(known)))
+            status["jobs"]
+                .as_array()
+                .is_some_and(|jobs| jobs.iter().any(|known| known["job"].as_u64() == job.parse().ok() && wanted(known)))
         });
     }
 }
@@ -88,7 +90,7 @@ impl Farm {
 fn jobs_are_ranked_paused_resumed_and_wait_for_each_other() {
     let farm = Farm::new();
     let denied = farm.client("keys/submitter-ann.pem", &["submit", "job.lua", "--priority", "5"]);
-    assert!(denied.code == Some(5) && denied.errors.contains("above 0 that takes an operator's key"), "{denied:?}");
+    assert!(denied.code == Some(8) && denied.errors.contains("above 0 that takes an operator's key"), "{denied:?}");
     let nothing = farm.client("keys/operator-operator.pem", &["submit", "job.lua", "--after", "77"]);
     assert!(nothing.code == Some(5) && nothing.errors.contains("job 77, and there is none"), "{nothing:?}");
 

@@ -52,6 +52,8 @@ struct Summary {
     image_hash: String,
     scene: Contents,
     warnings: Vec<String>,
+    /// Where it is one frame of several: which are there.
+    frames: Option<String>,
 }
 
 /// What the scene is made of.
@@ -92,12 +94,14 @@ impl Summary {
             image_hash: hash.to_string(),
             scene: Contents::of(job, statistics),
             warnings: warnings.clone(),
+            frames: job.frames.map(|(frame, frames)| format!("{frame} alone, of {frames}; --set frame=NUMBER checks another")),
         })
     }
 
     fn text(&self) -> String {
         let Self { name, width, height, samples, seed, .. } = self;
         let mut text = format!("{name}: {width} x {height} pixels, {samples} samples each, seed {seed}\n");
+        self.frames.iter().for_each(|frames| text.push_str(&format!("  {:<11} {frames}\n", "frame")));
         let lines = [
             ("scene", self.scene.text()),
             ("render", self.render.clone()),

@@ -66,6 +66,22 @@ impl Jobs {
     }
 }
 
+/// Does the same with several jobs, and tells of each: what fails for one is tried for the others all the same.
+///
+/// # Errors
+/// The first that there is.
+pub async fn each_job<F: Future<Output = Result<()>>>(jobs: &Jobs, said: &str, act: impl Fn(JobId) -> F) -> Result<()> {
+    let mut failed = None;
+    for job in jobs.numbers() {
+        match act(job).await {
+            Ok(()) => println!("job {} {said}", job.0),
+            Err(error) if failed.is_none() => failed = Some(error),
+            Err(error) => eprintln!("error: {error}"),
+        }
+    }
+    failed.map_or(Ok(()), Err)
+}
+
 fn job_range(text: &str) -> Result<(u64, u64), String> {
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let (first, last) = (job_number(first)?, job_number(last)?);

@@ -1,7 +1,7 @@
 //! `tessera delete`: removes jobs that is over from the coordinator's disk.
 
 use super::{
-    client::{Access, Jobs},
+    client::{Access, Jobs, each_job},
     runtime::{block_on, start_logs},
 };
 use crate::error::Result;
@@ -20,11 +20,8 @@ pub fn run(args: Args) -> Result<()> {
     start_logs("error");
     block_on(async {
         let client = args.access.connect().await?;
-        for job in args.jobs.numbers() {
-            client.delete(job).await?;
-            println!("job {} is deleted", job.0);
-        }
+        let done = each_job(&args.jobs, "is deleted", |job| client.delete(job)).await;
         client.close().await;
-        Ok(())
+        done
     })
 }

@@ -121,8 +121,21 @@ fn run(command: Command) -> Result<()> {
     }
 }
 
+/// Whoever reads what is printed may stop reading, as `head` does: that is no fault.
+fn end_with_reader() {
+    let usual = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        let message = panic.payload().downcast_ref::<String>().map_or("", String::as_str);
+        if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
+            process::exit(0);
+        }
+        usual(panic);
+    }));
+}
+
 /// The program: reads the command line, runs the subcommand, says an error on stderr. The exit code is that of [`crate::error::ExitCode`].
 pub fn main() -> process::ExitCode {
+    end_with_reader();
     match run(CommandLine::parse().command) {
         Ok(()) => process::ExitCode::SUCCESS,
         Err(error) => {

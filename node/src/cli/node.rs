@@ -36,7 +36,7 @@ pub struct Args {
     #[arg(long, value_name = "BYTES")]
     cache_bytes: Option<u64>,
     /// Seconds in which a node that is told to end (SIGTERM) finishes what its lanes render; told again it ends at once [default: 60].
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     drain: Option<f64>,
     /// Settings file; flags and environment go before it.
     #[arg(long, env = "TESSERA_CONFIG", value_name = "FILE")]
@@ -56,7 +56,11 @@ pub fn run(args: Args) -> Result<()> {
         lanes: args.lanes.or(file.lanes).unwrap_or_else(cores).max(1),
         cache: args.cache.or(file.cache),
         cache_bytes: args.cache_bytes.or(file.cache_bytes).unwrap_or(CACHE_BYTES),
-        drain: args.drain.or(file.drain).map_or(Ok(DRAIN_LIMIT), seconds)?,
+        drain: match args.drain.or(file.drain) {
+            Some(length) => seconds(length)
+                .map_err(|error| error.with_help("give --drain, or `drain` in the [node] section of the settings, 0 or more seconds"))?,
+            None => DRAIN_LIMIT,
+        },
         render: part::render,
     };
     if let Some(warning) = options.identity.warning() {

@@ -1,7 +1,7 @@
 //! `tessera pause`, `resume` and `rank`: give jobs another place in the queue.
 
 use super::{
-    client::{Access, Jobs},
+    client::{Access, Jobs, each_job},
     runtime::{block_on, start_logs},
 };
 use crate::{error::Result, limits::PRIORITY, wire::Place};
@@ -46,11 +46,8 @@ fn place(jobs: &Jobs, access: &Access, place: Place, said: &str) -> Result<()> {
     start_logs("error");
     block_on(async {
         let client = access.connect().await?;
-        for job in jobs.numbers() {
-            client.move_job(job, place).await?;
-            println!("job {} {said}", job.0);
-        }
+        let done = each_job(jobs, said, |job| client.move_job(job, place)).await;
         client.close().await;
-        Ok(())
+        done
     })
 }

@@ -71,7 +71,8 @@ pub async fn submit(
             terms.after = before.iter().copied().chain([job]).collect();
         }
         if let Some(frame) = rest.next() {
-            next = Some(script.load_frame(frame).map_err(|error| told(error, &all))?.0);
+            let loaded = script.load_frame(frame).map_err(|error| Error { message: format!("frame {frame}: {}", error.message), ..error });
+            next = Some(loaded.map_err(|error| told(error, &all))?.0);
         }
     }
     Ok(all)
@@ -80,7 +81,10 @@ pub async fn submit(
 /// An error in the middle of a sequence: what is submitted already goes on.
 fn told(error: Error, before: &[Submitted]) -> Error {
     match before {
-        [first, .., last] => error.with_help(format!("the frames before it are jobs {} to {}, and go on", first.job.0, last.job.0)),
+        [first, ..] if error.help.is_none() => {
+            let last = before.last().map_or(first.job.0, |last| last.job.0);
+            error.with_help(format!("the frames before it were submitted, as jobs {} to {last}", first.job.0))
+        }
         _ => error,
     }
 }

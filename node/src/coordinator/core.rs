@@ -283,7 +283,7 @@ impl Core {
             FromNode::Prepared { job, result } => Some(Event::Prepared { node, incarnation, job, result }),
             FromNode::Probed { job, cells } => Some(Event::Probed { node, incarnation, job, cells }),
             FromNode::Failed { job, lease, .. } if self.shared.leases.get(job, lease).is_none_or(|lease| lease.node != node) => {
-                Some(Event::NodeHeard { node, incarnation })
+                Some(self.too_late(node, incarnation, job, lease))
             }
             FromNode::Failed { job, lease, reason } => {
                 self.shared.leases.remove_of(node, job, lease);
@@ -304,13 +304,22 @@ impl Core {
         let handed_out = self.shared.leases.get(job, lease).is_some_and(|lease| lease.incarnation == incarnation);
         if !handed_out || bytes.is_empty() {
             self.say(node, incarnation, ToNode::Settled { job, lease });
-            return Some(Event::NodeHeard { node, incarnation });
+            return Some(self.too_late(node, incarnation, job, lease));
         }
         if self.pixels.contains_key(&(job, lease)) {
             return Some(Event::NodeHeard { node, incarnation });
         }
         self.pixels.insert((job, lease), Arrived { length: bytes.len(), bytes, at: Instant::now() });
         Some(Event::Rendered { node, incarnation, job, lease, hash, seconds })
+    }
+
+    /// What an answer tells that does not count any more: that its node lives, and perhaps that a lane does not hang.
+    fn too_late(&self, node: NodeId, incarnation: Incarnation, job: JobId, lease: LeaseId) -> Event {
+        if self.farm.hangs(node, job, lease) {
+            Event::Stopped { node, incarnation, job, lease }
+        } else {
+            Event::NodeHeard { node, incarnation }
+        }
     }
 
     pub(super) fn step(&mut self, event: Event) {

@@ -4,6 +4,7 @@ use std::{
     path::Path,
     sync::{
         Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicBool, Ordering},
         mpsc::{self, Receiver, Sender},
     },
     thread,
@@ -35,6 +36,8 @@ enum Deed {
 pub struct Disk {
     deeds: Sender<Deed>,
     filter: Filter,
+    /// Whether a snapshot is on its way.
+    renewing: Arc<AtomicBool>,
     metrics: Arc<Metrics>,
     /// For reading pixels back.
     pub pixels: Pixels,
@@ -78,11 +81,12 @@ impl Disk {
         }
         let pixels = Pixels(Arc::new(Mutex::new(journal)));
         let (deeds, received) = mpsc::channel();
-        let mut thread = Writer { pixels: pixels.clone(), inputs, metrics: metrics.clone(), trouble: None };
+        let renewing = Arc::new(AtomicBool::new(false));
+        let mut thread = Writer { pixels: pixels.clone(), inputs, metrics: metrics.clone(), renewing: renewing.clone(), trouble: None };
         thread.measure();
         let started = thread::Builder::new().name("journal".to_owned()).spawn(move || thread.run(&received));
         started.map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))?;
-        Ok((Self { deeds, filter: Filter::default(), metrics, pixels }, recovered.farm))
+        Ok((Self { deeds, filter: Filter::default(), renewing, metrics, pixels }, recovered.farm))
     }
 
     /// Notes an event that `farm` is about to take.
@@ -110,7 +114,10 @@ impl Disk {
 
     /// Lets the journal begin with the farm as it stands, in place of all that was noted before.
     pub fn renew(&self, farm: &Farm) {
-        self.send(Deed::Renew(Box::new(farm.clone())));
+        // One at a time: where the disk refuses, they would pile up.
+        if !self.renewing.swap(true, Ordering::Relaxed) {
+            self.send(Deed::Renew(Box::new(farm.clone())));
+        }
     }
 
     fn send(&self, deed: Deed) {
@@ -125,6 +132,7 @@ struct Writer {
     pixels: Pixels,
     inputs: InputSender<Input>,
     metrics: Arc<Metrics>,
+    renewing: Arc<AtomicBool>,
     /// Why the disk takes nothing, as the core was told.
     trouble: Option<String>,
 }
@@ -153,7 +161,10 @@ impl Writer {
                 }
                 Deed::Then(act) => then.push(act),
                 Deed::Forget(job) => over.push(job),
-                Deed::Renew(farm) => self.retry(|journal| journal.renew(&farm)),
+                Deed::Renew(farm) => {
+                    self.retry(|journal| journal.renew(&farm));
+                    self.renewing.store(false, Ordering::Relaxed);
+                }
             }
         }
         self.retry(Journal::sync);

@@ -1,6 +1,6 @@
 //! Jobs in the hands of the core's task: they are taken, their files are written, the disk holds them up, they end.
 
-use std::{collections::BTreeMap, collections::BTreeSet, sync::Arc, thread, time::Instant};
+use std::{collections::BTreeMap, sync::Arc, thread, time::Instant};
 
 use tokio::sync::oneshot;
 
@@ -16,7 +16,7 @@ use super::{
 use crate::{
     farm::{Event, JobId, JobSnapshot, Outcome},
     job::JobDescription,
-    limits::{DISK_RETRY, JOBS_PER_SUBMITTER, JOURNAL_EVENTS},
+    limits::{DISK_RETRY, JOBS_FOR_OPERATORS, JOBS_PER_SUBMITTER, JOBS_WAITING, JOURNAL_EVENTS},
     wire::{JobState, Terms},
 };
 
@@ -62,10 +62,12 @@ impl Core {
         if let Some(refusal) = self.refusal() {
             return Err(refusal);
         }
-        let mut running = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none());
-        let own = |job: &JobSnapshot| self.shared.store.owner(job.id).as_deref() == Some(owner);
-        if limited && running.by_ref().filter(own).count() >= JOBS_PER_SUBMITTER {
+        let running: Vec<JobSnapshot> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).collect();
+        if limited && running.iter().filter(|job| job.owner == owner).count() >= JOBS_PER_SUBMITTER {
             return Err(format!("{JOBS_PER_SUBMITTER} jobs of {owner} wait or run already"));
+        }
+        if running.len() >= JOBS_WAITING - if limited { JOBS_FOR_OPERATORS } else { 0 } {
+            return Err(format!("{} jobs wait or run already", running.len()));
         }
         self.settle_dependencies(&mut terms)?;
         let job = self.shared.store.next_job().map_err(|error| words(&error))?;
@@ -85,10 +87,12 @@ impl Core {
 
     /// Jobs that are finished and perhaps forgotten need not be waited for; such as came to no good end, or never were, cannot be.
     fn settle_dependencies(&self, terms: &mut Terms) -> Result<(), String> {
-        let open: BTreeSet<JobId> = self.farm.jobs().iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
-        let ended: Vec<JobId> = terms.after.iter().copied().filter(|job| !open.contains(job)).collect();
-        for job in ended {
-            match self.shared.store.end(job).map(|end| end.state) {
+        let known: BTreeMap<JobId, JobState> = self.farm.jobs().iter().map(|job| (job.id, status::state_of(job))).collect();
+        for job in terms.after.clone() {
+            // What the farm has forgotten the store knows; the end of what has just ended may not be on disk yet.
+            let state = known.get(&job).cloned().map_or_else(|| self.shared.store.end(job).map(|end| end.state), Ok);
+            match state {
+                Ok(state) if !state.is_over() => {}
                 Ok(JobState::Finished) => terms.after.retain(|other| *other != job),
                 Ok(state) => return Err(format!("it is to wait for job {}, which is not finished: {}", job.0, status::words(&state))),
                 Err(_) => return Err(format!("it is to wait for job {}, and there is none; `tessera list` shows which there are", job.0)),

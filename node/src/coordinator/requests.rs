@@ -98,7 +98,6 @@ async fn answer(
 async fn move_job(shared: &Shared, client: &Peer, job: JobId, place: Place) -> Result<(), String> {
     if let Place::Ranked(priority) = place {
         submission::check_priority(priority)?;
-        may_rank(client, priority)?;
     }
     let (reply, answer) = oneshot::channel();
     shared.ask(Input::Move { job, place, reason: format!("by {client}"), reply }, answer).await
@@ -114,6 +113,9 @@ fn may_rank(client: &Peer, priority: i32) -> Result<(), String> {
 
 /// Whether a client's role lets it ask for this.
 fn permit(shared: &Shared, client: &Peer, request: &Request) -> Result<(), String> {
+    if let Request::Submit { terms: Terms { priority, .. }, .. } | Request::Move { place: Place::Ranked(priority), .. } = request {
+        may_rank(client, *priority)?;
+    }
     let (deed, job) = match request {
         Request::Submit { .. } => (Deed::Submit, None),
         Request::Status | Request::List | Request::Watch { .. } => (Deed::Look, None),
@@ -149,7 +151,7 @@ async fn submit(
 ) -> Result<(), FrameError> {
     let submitting = shared.store.submitting.clone();
     let _taking = submitting.read().await;
-    if let Err(reason) = may_submit(shared, client, &description, &terms).await {
+    if let Err(reason) = may_submit(shared, &description, &terms).await {
         return say(send, &Response::Refused { reason }).await;
     }
     let wanted: Vec<_> = description.assets.iter().copied().filter(|id| !shared.store.asset(*id).exists()).collect();
@@ -190,9 +192,8 @@ async fn bytes_left(shared: &Shared, owner: &str) -> io::Result<u64> {
 }
 
 /// Whether a job is taken: it is as it should be, and there is room for it.
-async fn may_submit(shared: &Shared, client: &Peer, description: &JobDescription, terms: &Terms) -> Result<(), String> {
+async fn may_submit(shared: &Shared, description: &JobDescription, terms: &Terms) -> Result<(), String> {
     submission::check(description, terms)?;
-    may_rank(client, terms.priority)?;
     shared.status.borrow().refusal.clone().map_or(Ok(()), Err)?;
     let (store, film) = (shared.store.clone(), &description.frame.film);
     let pixels = u64::from(film.width) * u64::from(film.height);

@@ -6,7 +6,7 @@ use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
     limits::{
-        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY,
+        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, NODES, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY,
         SAMPLES_PER_PIXEL,
     },
     schedule::{Probe, Split},
@@ -109,7 +109,7 @@ pub fn spec(description: &JobDescription, terms: &Terms, owner: &str) -> JobSpec
         probe: probe.clone(),
         split: split.clone(),
         assign: *assign,
-        min_nodes: terms.min_nodes.max(1),
+        min_nodes: terms.min_nodes.clamp(1, NODES as u32),
         audit: *audit,
         owner: owner.to_owned(),
         priority: terms.priority,

@@ -52,6 +52,9 @@ impl Job {
             (attempt.end, attempt.seconds) = (Some(now), Some(seconds));
         }
         let cost = state.cost;
+        if seconds.is_finite() && seconds >= 0.0 {
+            self.taken = (self.taken.0 + 1, self.taken.1 + seconds);
+        }
         self.members.entry(node).and_modify(|member| member.note_pace(cost, seconds));
         if is_audit {
             self.compare(lease, part);

@@ -1,12 +1,10 @@
 //! Jobs end, or are left by all nodes.
 
-use std::time::Duration;
-
 use super::job::{Job, Phase, Stage};
-use super::node::{Node, Nodes};
+use super::node::{Node, NodeState, Nodes};
 use super::part::{PartState, Place};
 use super::turn::Turn;
-use super::{Build, Command, FarmConfig, Outcome, ToNode};
+use super::{Build, Command, Outcome, ToNode};
 use crate::manifest::AttemptOutcome;
 use crate::schedule::NodeId;
 
@@ -25,7 +23,7 @@ impl Job {
         self.audits.clear();
         (self.reconsider, self.next_due) = (None, None);
         self.question = None;
-        self.deserted = None;
+        (self.deserted, self.gives_up) = (None, None);
         self.paused = false;
         self.log.ended = Some(turn.now);
         self.phase = Phase::Over(outcome.clone());
@@ -36,6 +34,11 @@ impl Job {
     /// The output files stand, or cannot be written.
     pub fn assembled(&mut self, turn: &mut Turn, nodes: &mut Nodes, result: Result<(), String>) {
         if self.phase == Phase::Assembling {
+            // Pixels were revoked meanwhile: the files are made again when they are here.
+            if !self.is_settled() {
+                self.phase = Phase::Rendering;
+                return;
+            }
             let holes = self.holes().count();
             let whole = if holes == 0 { Outcome::Finished } else { Outcome::Incomplete { holes } };
             self.end(turn, nodes, result.map_or_else(|reason| Outcome::Failed { reason }, |()| whole));
@@ -55,13 +58,16 @@ impl Job {
         let of_build = |node: &Node| node.proof.is_none() || self.is_of_build(node);
         // A lane that seems to hang may only be slow: that is reason enough to go elsewhere, but not to give up.
         let outdated = self.is_outdated(turn, nodes);
-        let works = |node: &Node| node.is_hopeful() && (node.lanes() > 0 || !outdated);
+        let finishes = |node: &Node| node.state == NodeState::Draining && node.held_of(self.id).next().is_some();
+        let works = |node: &Node| (node.is_hopeful() || finishes(node)) && (node.lanes() > 0 || !outdated);
         if !wants || self.paused || nodes.iter().any(|(id, node)| works(node) && of_build(node) && able(id)) {
-            self.deserted = None;
+            (self.deserted, self.gives_up) = (None, None);
             return;
         }
         let since = *self.deserted.get_or_insert(turn.now);
-        let patience = self.patience(&turn.config);
+        let patience = self.spec.patience.unwrap_or(turn.config.no_node_timeout);
+        let patience = if outdated { patience.min(turn.config.no_node_timeout) } else { patience };
+        self.gives_up = Some(since + patience);
         if turn.strikes(since + patience) {
             if outdated {
                 self.begin_anew(turn, nodes);
@@ -75,11 +81,6 @@ impl Job {
     fn is_outdated(&self, turn: &Turn, nodes: &Nodes) -> bool {
         let current = |build: &Build| nodes.values().any(|node| node.is_ready() && node.proof == Some(build.canary));
         self.build != turn.build && turn.build.as_ref().is_some_and(current)
-    }
-
-    /// How long it waits for a node when there is none.
-    pub(super) fn patience(&self, config: &FarmConfig) -> Duration {
-        self.spec.patience.unwrap_or(config.no_node_timeout)
     }
 
     fn desertion(&self, seconds: f64) -> String {

@@ -110,6 +110,10 @@ pub(super) struct Job {
     pub deserted: Option<Duration>,
     /// When nodes with nothing to do look again for something to take.
     pub reconsider: Option<Duration>,
+    /// Parts that were delivered, and the seconds that lanes took for them.
+    pub taken: (u32, f64),
+    /// When it gives up waiting for a node.
+    pub gives_up: Option<Duration>,
     /// When nodes may take from others again.
     pub steal_after: Duration,
     /// When the next attempt will have taken suspiciously long.
@@ -141,6 +145,8 @@ impl Job {
             split_into: 0,
             reconsider: None,
             steal_after: Duration::ZERO,
+            taken: (0, 0.0),
+            gives_up: None,
             next_due: None,
             question: None,
             deserted: None,
@@ -181,9 +187,8 @@ impl Job {
             Phase::Probing(probing) => probing.deadline,
             _ => None,
         };
-        let deserted = self.deserted.map(|since| since + self.patience(config));
         let question = self.question.as_ref().map(|question| question.deadline);
-        preparing.chain(phase).chain(deserted).chain(question).chain(self.reconsider).chain(self.next_due).min()
+        preparing.chain(phase).chain(self.gives_up).chain(question).chain(self.reconsider).chain(self.next_due).min()
     }
 
     /// Nodes that get work now: there, with the scene, measured, and with a lane that works.

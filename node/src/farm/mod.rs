@@ -135,6 +135,11 @@ impl Farm {
         self.turn.now
     }
 
+    /// Whether the lane of an attempt is taken to hang: then even an answer that comes too late to count tells something.
+    pub fn hangs(&self, node: crate::schedule::NodeId, job: JobId, lease: LeaseId) -> bool {
+        self.nodes.get(&node).is_some_and(|node| node.hanging.contains(&(job, lease)))
+    }
+
     /// Whether a node is suspected: then a sign of life changes more than a time.
     pub fn is_suspected(&self, node: crate::schedule::NodeId) -> bool {
         self.nodes.get(&node).is_some_and(|node| node.state == NodeState::Suspected)

@@ -4,7 +4,7 @@
 //! any other lane none at all. The part's cost is taken to be at least what it took by then, so that a part that is only hard is
 //! tried again less and less eagerly.
 
-use super::job::{Job, Member};
+use super::job::Job;
 use super::node::Nodes;
 use super::part::Role;
 use super::turn::Turn;
@@ -38,11 +38,11 @@ impl Job {
         let open = self.leases.iter().filter(|(_, lease)| lease.role != Role::Stray);
         let overdue: Vec<LeaseId> = open.filter(|(_, lease)| lease.due.is_some_and(late)).map(|(id, _)| *id).collect();
         overdue.into_iter().for_each(|lease| self.is_overdue(turn, nodes, lease));
-        let holds =
-            |id: &NodeId, member: &Member| !member.queue.is_empty() || nodes.get(id).is_some_and(|node| node.held_of(self.id).count() > 0);
-        let stuck = |(id, member): &(&NodeId, &Member)| nodes.get(id).is_some_and(|node| node.lanes() == 0) && holds(id, member);
-        let stuck: Vec<NodeId> = self.members.iter().filter(stuck).map(|(id, _)| *id).collect();
-        stuck.into_iter().for_each(|id| self.strip(turn, nodes, id, "no lane of its node makes progress"));
+        self.look_for_due();
+    }
+
+    /// When the next attempt will have taken suspiciously long.
+    pub(super) fn look_for_due(&mut self) {
         self.next_due = self.leases.values().filter(|lease| lease.role != Role::Stray).filter_map(|lease| lease.due).min();
     }
 
@@ -57,5 +57,8 @@ impl Job {
         self.log.event(turn.now, EventKind::Overdue, Some(node), vec![part], detail);
         nodes.entry(node).and_modify(|node| _ = node.hanging.insert((self.id, lease)));
         self.set_aside(turn, nodes, lease);
+        if nodes.get(&node).is_some_and(|node| node.lanes() == 0) {
+            turn.stuck.insert(node);
+        }
     }
 }

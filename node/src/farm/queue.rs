@@ -1,7 +1,7 @@
 //! Which jobs run, and which of them hands out next: by priority, then by how much their submitters have had, then in order of submission.
 //!
 //! A job with the first claim takes every lane that it has work for; what it leaves is for the next one, so that no lane waits for the last parts of
-//! a frame. Submitters of equal priority share: each part that is handed out counts by its cost, and whoever has had least is next. Who comes
+//! a frame. Submitters of equal priority share: each part that is handed out counts by the seconds that parts of its job take, and whoever has had least is next. Who comes
 //! (again) is taken to have had as much as those who are there: nobody saves up, and nobody is punished for having been alone.
 //! (Start-time fair queueing: Goyal, Vin, Cheng, 1996.)
 
@@ -21,8 +21,10 @@ pub(super) struct Queue {
     pub open: BTreeSet<JobId>,
     /// Jobs that have not begun, and perhaps ended before they could.
     waiting: BTreeSet<JobId>,
-    /// Cost that was handed out to each submitter who has open jobs.
+    /// Lane seconds that each submitter with open jobs has had, on the clock of `served`.
     had: BTreeMap<String, f64>,
+    /// What whoever was served last had had before: nobody counts as having had less.
+    served: f64,
     /// Open jobs that have work for all lanes, as it was when the queue was last looked at.
     busy: BTreeSet<JobId>,
     /// Whether something else has happened since that may let a job begin.
@@ -62,8 +64,11 @@ impl Farm {
 
     /// Jobs that are over are known for a while: the oldest go, but those that others wait for.
     fn forget_jobs(&mut self) {
-        let awaited: BTreeSet<JobId> = self.waiting_jobs().flat_map(|job| job.spec.after.iter().copied()).collect();
         let over: Vec<JobId> = self.jobs.values().filter(|job| job.outcome().is_some()).map(|job| job.id).collect();
+        if over.len() <= JOBS_KEPT {
+            return;
+        }
+        let awaited: BTreeSet<JobId> = self.waiting_jobs().flat_map(|job| job.spec.after.iter().copied()).collect();
         let old = over.iter().take(over.len().saturating_sub(JOBS_KEPT));
         old.filter(|id| !awaited.contains(id)).for_each(|id| _ = self.jobs.remove(id));
     }
@@ -74,6 +79,9 @@ impl Farm {
             self.note_begun();
             self.take_turns();
             self.note_ends();
+            if self.strip_stuck() {
+                continue;
+            }
             if !self.begin_next() {
                 break;
             }
@@ -89,9 +97,9 @@ impl Farm {
             let quota = if shares { 1 + self.nodes.len() / NODES_PER_TURN } else { usize::MAX };
             (self.turn.quota, self.turn.handed_out) = (quota, (0, 0.0));
             self.with_job(id, |job, turn, nodes| job.advance(turn, nodes));
-            let (count, cost) = std::mem::take(&mut self.turn.handed_out);
-            if let Some(job) = self.jobs.get(&id).filter(|_| cost.is_finite()) {
-                *self.queue.had.entry(job.spec.owner.clone()).or_default() += cost;
+            let (count, seconds) = std::mem::take(&mut self.turn.handed_out);
+            if count > 0 {
+                self.charge(id, seconds);
             }
             if count < quota {
                 rest.retain(|other| *other != id);
@@ -100,11 +108,18 @@ impl Farm {
         self.turn.quota = 0;
     }
 
+    fn charge(&mut self, id: JobId, seconds: f64) {
+        let Some(owner) = self.jobs.get(&id).map(|job| job.spec.owner.clone()) else { return };
+        let had = self.queue.had.entry(owner).or_default();
+        self.queue.served = had.max(self.queue.served);
+        *had = self.queue.served + seconds;
+    }
+
     fn compare_claims(&self, a: JobId, b: JobId) -> std::cmp::Ordering {
         let claim = |id: JobId| {
             let spec = self.jobs.get(&id).map(|job| &job.spec);
             let had = spec.and_then(|spec| self.queue.had.get(&spec.owner)).copied().unwrap_or_default();
-            (Reverse(spec.map(|spec| spec.priority)), had)
+            (Reverse(spec.map(|spec| spec.priority)), had.max(self.queue.served))
         };
         let ((rank, had), (other_rank, other_had)) = (claim(a), claim(b));
         rank.cmp(&other_rank).then(had.total_cmp(&other_had)).then(a.cmp(&b))
@@ -121,6 +136,15 @@ impl Farm {
         for id in std::mem::take(&mut self.turn.freed) {
             self.with_open(|job, turn, nodes| job.note_begun(turn, nodes, id));
         }
+    }
+
+    /// Nodes whose last lane hangs hold nothing of any job any more. Says whether there are any.
+    fn strip_stuck(&mut self) -> bool {
+        let stuck = std::mem::take(&mut self.turn.stuck);
+        for id in &stuck {
+            self.with_open(|job, turn, nodes| job.strip(turn, nodes, *id, "no lane of its node makes progress"));
+        }
+        !stuck.is_empty()
     }
 
     /// Takes jobs that are over off the books. What the latest of them did is known until another ends.
@@ -171,13 +195,14 @@ impl Farm {
         true
     }
 
-    /// Fails a job that waits for one that came to no good end.
+    /// Fails jobs that wait for one that came to no good end.
     fn fail_orphans(&mut self) -> bool {
-        let orphan = self.waiting_jobs().filter_map(|job| Some((job.id, self.trouble_ahead(job)?))).next();
-        let Some((id, reason)) = orphan else { return false };
-        self.with_job(id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason }));
+        let orphans: Vec<(JobId, String)> = self.waiting_jobs().filter_map(|job| Some((job.id, self.trouble_ahead(job)?))).collect();
+        for (id, reason) in &orphans {
+            self.with_job(*id, |job, turn, nodes| job.end(turn, nodes, Outcome::Failed { reason: reason.clone() }));
+        }
         self.note_ends();
-        true
+        !orphans.is_empty()
     }
 
     fn trouble_ahead(&self, job: &Job) -> Option<String> {
@@ -192,16 +217,18 @@ impl Farm {
 
     /// The waiting job with the first claim that nothing holds back.
     fn next_to_begin(&self) -> Option<JobId> {
-        // Who lets jobs wait holds up nobody but themselves.
-        if self.open_jobs().filter(|job| job.is_active()).count() >= JOBS_AT_ONCE {
-            return None;
-        }
+        // Who lets jobs wait holds up nobody but themselves, and nobody holds up those of higher rank.
+        let full = |job: &Job| {
+            self.open_jobs().filter(|other| other.is_active() && other.spec.priority >= job.spec.priority).count() >= JOBS_AT_ONCE
+        };
         let own = |job: &Job| self.open_jobs().filter(|other| other.spec.owner == job.spec.owner).count();
         let due = self
             .waiting_jobs()
             .filter(|job| !job.paused)
             .filter(|job| !job.spec.after.iter().any(|id| self.jobs.get(id).is_some_and(|other| other.outcome().is_none())));
-        due.filter(|job| own(job) < JOBS_AT_ONCE && !self.is_held_back(job)).map(|job| job.id).min_by(|a, b| self.compare_claims(*a, *b))
+        due.filter(|job| !full(job) && own(job) < JOBS_AT_ONCE && !self.is_held_back(job))
+            .map(|job| job.id)
+            .min_by(|a, b| self.compare_claims(*a, *b))
     }
 
     /// Whether another job has work for all lanes, and a claim before this one. Submitters of equal priority run side by side.
@@ -213,13 +240,9 @@ impl Farm {
         self.queue.busy.iter().filter_map(|id| self.jobs.get(id)).any(before)
     }
 
-    /// A job's submitter is taken to have had as much as the one who has had least of those who are there.
     fn join_queue(&mut self, id: JobId) {
         self.queue.open.insert(id);
         self.queue.waiting.remove(&id);
-        let Some(owner) = self.jobs.get(&id).map(|job| job.spec.owner.clone()) else { return };
-        let least = self.queue.had.values().copied().min_by(f64::total_cmp).unwrap_or_default();
-        self.queue.had.entry(owner).or_insert(least);
     }
 }
 

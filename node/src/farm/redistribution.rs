@@ -56,6 +56,8 @@ impl Job {
         if self.members.get(&id).is_some_and(|member| member.stage == Stage::Prepared) {
             self.probe_latecomer(turn, nodes, id);
         }
+        self.note_begun(turn, nodes, id);
+        self.look_for_due();
         self.enlist(turn, nodes, id);
     }
 

@@ -11,6 +11,10 @@ use crate::limits::{OVERDUE_AFTER, OVERDUE_FACTOR};
 use crate::manifest::EventKind;
 use crate::schedule::{Assign, NodeId, PartId};
 
+/// Bounds of what an attempt counts in its submitter's share, in seconds.
+const LEAST_CHARGE: f64 = 1e-3;
+const MOST_CHARGE: f64 = 1e5;
+
 impl Job {
     pub(super) fn advance_rendering(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         if self.phase != Phase::Rendering {
@@ -100,6 +104,12 @@ impl Job {
         }
     }
 
+    /// Seconds that lanes took for a part, on the average: measured by the farm, for a submitter could say anything of costs.
+    fn usual_seconds(&self) -> Option<f64> {
+        let (count, seconds) = self.taken;
+        (count > 0).then(|| (seconds / f64::from(count)).clamp(LEAST_CHARGE, MOST_CHARGE))
+    }
+
     /// Lets a node attempt a part.
     pub(super) fn lease(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, part: PartId, role: Role) -> Option<super::LeaseId> {
         let node = nodes.get_mut(&id)?;
@@ -107,13 +117,14 @@ impl Job {
         self.leases.insert(lease, Lease { part, node: id, incarnation: node.incarnation, role, begun: None, due: None });
         let state = self.part_mut(part);
         state.begin_attempt(lease, id, turn.now);
-        let (rect, suspect, cost) = (state.rect, state.suspect, state.expected);
+        let (rect, suspect, seconds) = (state.rect, state.suspect, state.expected);
+        let seconds = self.usual_seconds().unwrap_or(seconds.clamp(LEAST_CHARGE, MOST_CHARGE));
         node.held.push(Held { job: self.id, lease, suspect });
         if node.held.len() >= node.capacity(&turn.config) {
             turn.roomy.remove(&id);
         }
         turn.quota = turn.quota.saturating_sub(1);
-        turn.handed_out = (turn.handed_out.0 + 1, turn.handed_out.1 + cost);
+        turn.handed_out = (turn.handed_out.0 + 1, turn.handed_out.1 + seconds);
         turn.send(id, node, ToNode::Render { job: self.id, lease, rect, samples: self.all_samples() });
         self.note_begun(turn, nodes, id);
         self.log.first_lease.get_or_insert(turn.now);

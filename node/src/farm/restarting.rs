@@ -44,10 +44,13 @@ impl Job {
     /// The coordinator was started anew: pixels that were not on disk are gone, and what was asked has to be asked again.
     fn restarted(&mut self, turn: &mut Turn) {
         self.question = None;
-        self.deserted = None;
+        (self.deserted, self.gives_up) = (None, None);
         let gone: Vec<PartId> = self.committing.values().copied().collect();
         for part in gone {
             self.take_back(part, AttemptOutcome::Lost, "the coordinator was started anew");
+        }
+        if self.phase == Phase::Assembling && !self.is_settled() {
+            self.phase = Phase::Rendering;
         }
         if self.phase == Phase::Assembling {
             turn.put(Command::Assemble { job: self.id });

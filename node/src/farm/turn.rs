@@ -29,7 +29,7 @@ pub(super) struct Turn {
     /// Attempts that the job at hand may still hand out, before others have their turn.
     #[serde(skip)]
     pub quota: usize,
-    /// Attempts that it has handed out, and what they cost.
+    /// Attempts that it has handed out, and the seconds that lanes will take for them.
     #[serde(skip)]
     pub handed_out: (usize, f64),
     /// Nodes that may have room for an attempt; all others have none.
@@ -42,6 +42,9 @@ pub(super) struct Turn {
     /// Nodes that let go of an attempt of one job and hold attempts of others, which may have begun now.
     #[serde(skip)]
     pub freed: BTreeSet<NodeId>,
+    /// Nodes whose last lane hangs since this step.
+    #[serde(skip)]
+    pub stuck: BTreeSet<NodeId>,
 }
 
 impl Turn {
@@ -59,6 +62,7 @@ impl Turn {
             ended: false,
             build: None,
             freed: BTreeSet::new(),
+            stuck: BTreeSet::new(),
         }
     }
 

@@ -43,7 +43,8 @@ impl Bench {
     fn deliver(&mut self, job: u64) {
         let (node, lease) = self.running(job)[0];
         let job = JobId(job);
-        self.does(Event::Rendered { node, incarnation: Incarnation(1), job, lease, hash: [3; 32], seconds: 1.0 });
+        let area = self.farm.parts(job).iter().find(|part| part.id.0 == 0).unwrap().rect.area();
+        self.does(Event::Rendered { node, incarnation: Incarnation(1), job, lease, hash: [3; 32], seconds: area as f64 / 256.0 });
         self.prepare();
         self.does(Event::Committed { job, lease });
         self.prepare();
@@ -99,13 +100,15 @@ fn a_higher_priority_goes_first_whoever_came_before() {
 }
 
 #[test]
-fn submitters_of_equal_priority_share_by_cost() {
+fn submitters_of_equal_priority_share_by_the_time_that_their_parts_take() {
     let mut bench = bench(1);
-    // Parts of the second cost four times as much.
+    // Parts of the second take four times as long, whatever it says of them.
     bench.submit(1, |spec| spec.owner = "ann".into());
     bench.submit(2, |spec| {
         spec.owner = "ben".into();
         spec.split = Split::Grid { width: 32, height: 32 };
+        spec.probe =
+            Probe::Known { costs: CostMap { cell: 64, columns: 1, rows: 1, seconds_per_pixel: vec![0.0] }, powers: BTreeMap::new() };
     });
     let mut handed_out = BTreeMap::from([(1, 0), (2, 0)]);
     for _ in 0..12 {

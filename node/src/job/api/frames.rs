@@ -50,7 +50,8 @@ fn read(field: &Field) -> mlua::Result<Frames> {
         }
     };
     if frames.last < frames.first {
-        return Err(field.fault(format!("ends with frame {} before its first, {}", frames.last, frames.first)).into());
+        let fault = field.fault(format!("ends with frame {} before its first, {}", frames.last, frames.first));
+        return Err(fault.with_help("write it as {first, last}").into());
     }
     let count = frames.numbers().count();
     if count > FRAMES_PER_SEQUENCE {
@@ -61,6 +62,10 @@ fn read(field: &Field) -> mlua::Result<Frames> {
 
 /// A value that may be a function of the frame's number.
 pub fn of_frame<'k, 'a>(mut field: Field<'k, 'a>, frames: Option<&(u32, Frames)>) -> mlua::Result<Field<'k, 'a>> {
+    if field.function().is_some() && frames.is_none() {
+        let fault = field.fault("is a function of the frame's number, and the job has no frames");
+        return Err(fault.with_help("give the job `frames = { 1, 240 }`, or call the function").into());
+    }
     if let (Some(function), Some((frame, _))) = (field.function(), frames) {
         field.value = function.call::<Value>(*frame)?;
         if field.value.is_nil() {
