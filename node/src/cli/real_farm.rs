@@ -64,7 +64,7 @@ pub fn run(deaths: u32) -> Result<()> {
     let rows: Vec<_> = std::iter::once(head).chain(rows.map(|(name, seconds)| row(name, seconds))).collect();
     lined_up(&rows).iter().for_each(|line| println!("{line}"));
     println!("{} parts in all; rendered again after they were committed: {}", figures.parts, figures.again);
-    println!("different pictures: {}", figures.pictures.len());
+    println!("pictures that differ from the first: {}", figures.pictures.len().saturating_sub(1));
     let missed: Vec<&str> = [
         (share(&figures.noticed, 0.99) > NOTICED_WITHIN, "a death was noticed late"),
         (share(&figures.listening, 1.0) > BACK_WITHIN, "a coordinator came back late"),

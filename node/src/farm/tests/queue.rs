@@ -228,3 +228,54 @@ fn each_job_stays_on_nodes_of_one_build() {
     assert_eq!(bench.farm.jobs()[0].committed, 0);
     assert!(record.events.iter().any(|event| event.kind == EventKind::BegunAnew));
 }
+
+/// A node turns out to deliver wrong pixels while another job's files are written: those do not count, and are made again without its pixels.
+#[test]
+fn files_that_hold_pixels_of_a_quarantined_node_are_made_again() {
+    let mut bench = bench(3);
+    bench.submit(1, |_| ());
+    while !bench.running(1).is_empty() {
+        bench.deliver(1);
+    }
+    assert_eq!(bench.phase(1), JobPhase::Assembling);
+    bench.submit(2, |spec| spec.audit = 1.0);
+    let bad = |bench: &Bench| bench.farm.nodes()[0].state == NodeState::Quarantined;
+    while !bad(&bench) {
+        let (node, lease) = bench.running(2)[0];
+        let hash = if node.0 == 0 { [9; 32] } else { [3; 32] };
+        bench.does(Event::Rendered { node, incarnation: Incarnation(1), job: JobId(2), lease, hash, seconds: 1.0 });
+        bench.does(Event::Committed { job: JobId(2), lease });
+    }
+    let left = bench.farm.jobs()[0].committed;
+    assert!(left < 16, "what it had delivered is revoked");
+    bench.does(Event::Assembled { job: JobId(1), result: Ok(()) });
+    assert_eq!((bench.ended(1), bench.phase(1)), (None, JobPhase::Rendering));
+    bench.does(Event::JobCancelled { job: JobId(2), reason: "it has shown enough".into() });
+    while bench.farm.jobs()[0].committed < 16 {
+        bench.deliver(1);
+    }
+    assert_eq!(bench.phase(1), JobPhase::Assembling);
+    bench.does(Event::Assembled { job: JobId(1), result: Ok(()) });
+    assert_eq!(bench.ended(1), Some(Outcome::Finished));
+}
+
+/// Jobs that wait for someone hold nobody up but their submitter, and a rank above all others is never held up.
+#[test]
+fn no_submitter_holds_up_the_others() {
+    let mut bench = bench(1);
+    for job in 1..=8 {
+        bench.submit(job, |spec| spec.owner = "ann".into());
+        bench.does(Event::JobPaused { job: JobId(job), reason: "by ann".into() });
+        bench.prepare();
+    }
+    bench.submit(9, |spec| spec.owner = "ann".into());
+    assert_eq!(bench.phase(9), JobPhase::Waiting, "as many of hers have begun as may");
+    for (job, owner) in (10..18).zip(["b", "c", "d", "e", "f", "g", "h", "i"]) {
+        bench.submit(job, |spec| spec.owner = owner.into());
+        assert_eq!(bench.phase(job), JobPhase::Rendering);
+    }
+    bench.submit(18, |spec| spec.owner = "j".into());
+    assert_eq!(bench.phase(18), JobPhase::Waiting);
+    bench.submit(19, |spec| (spec.owner, spec.priority) = ("operator".into(), 1));
+    assert_eq!(bench.phase(19), JobPhase::Rendering);
+}
