@@ -102,11 +102,12 @@ impl Normalisation {
 }
 
 impl BoxRay {
-    /// Whether all its numbers are some. A ray from where numbers end has none, and every comparison would let it into boxes that are not there.
+    /// Whether all its numbers are some. A ray from where numbers end has none, and every comparison would let it into boxes that are not there. One that
+    /// started anew from so far away that its own error is beyond numbers meets nothing.
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
         let ([x, y, z, _], [dx, dy, dz, _]) = (self.origin, self.direction);
-        ((x + y + z) + (dx + dy + dz)).is_finite()
+        (((x + y) + (z + self.magnitude)) + (dx + dy + dz)).is_finite()
     }
 
     /// A parameter of the original ray as a limit for boxes, rounded up.

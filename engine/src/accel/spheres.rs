@@ -45,11 +45,11 @@ pub struct SphereList {
 #[derive(Clone, Copy, Debug)]
 struct Pack {
     center: [[f32; 8]; 3],
-    /// Far below 0 in empty places, which then never pass.
+    /// Below all numbers in empty places, which then never pass, however far an error reaches.
     radius: [f32; 8],
 }
 
-const EMPTY: f32 = -1e30;
+const EMPTY: f32 = f32::NEG_INFINITY;
 
 impl SphereList {
     /// A list of at most [`MOST`] spheres; those beyond are left out.
@@ -176,5 +176,18 @@ mod tests {
         let visited = |ray: &Ray| unsafe { list.candidates::<Baseline>(ray, 8.0) }.collect::<Vec<_>>();
         assert_eq!(visited(&ray), [0, 1]);
         assert_eq!(visited(&Ray { leaves: 1, ..ray }), [1]);
+    }
+
+    /// Rays from where numbers end reach far, but not into places where no sphere is.
+    #[test]
+    fn empty_places_are_never_visited() {
+        let list = SphereList::new(&[Sphere { center: DVec3::ZERO, radius: 1.0 }]);
+        for size in [1e20, 1e50, 1e56, 1e90, 1e200, 1e308, f64::INFINITY, f64::NAN] {
+            for (origin, limit) in [(spread(1), f64::INFINITY), (spread(2), 1.0), (DVec3::NEG_Z, 2.0 * size)] {
+                let ray = Ray::new(origin * size, -origin.normalize());
+                // SAFETY: every processor has the baseline.
+                unsafe { list.candidates::<Baseline>(&ray, limit) }.for_each(|place| assert_eq!(place, 0, "{ray:?}"));
+            }
+        }
     }
 }

@@ -69,3 +69,29 @@ fn depth_fits(binary: &[build::BinaryNode]) -> bool {
     }
     depth.into_iter().max().unwrap_or(0) <= MAX_DEPTH
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Baseline;
+
+    /// Rays from where numbers end meet every box or none, but no empty place of a node.
+    #[test]
+    fn empty_places_are_never_visited() {
+        let boxes = [-1.0, 0.0, 3.0].map(|x| Bounds::of([DVec3::splat(x), DVec3::splat(x + 0.5)]));
+        let tree = Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |_, things| 100 + things[0]);
+        for size in [1.0, 1e20, 1e38, 1e50, 1e53, 1e56, 1e90, 1e200, 1e307, f64::INFINITY, f64::NAN] {
+            for axes in [DVec3::X, DVec3::new(0.3, -0.5, 0.9), DVec3::NEG_ONE] {
+                for length in [1.0, 1e-30, 1e30, 1e200] {
+                    let ray = tree.ray::<false>(axes * size, -axes * length);
+                    let leaf = |reference| {
+                        assert!(reference >= 100, "{ray:?}");
+                        ControlFlow::Continue(f32::INFINITY)
+                    };
+                    // SAFETY: every processor has the baseline.
+                    unsafe { tree.visit::<Baseline, false>(&ray, f32::INFINITY, leaf) };
+                }
+            }
+        }
+    }
+}

@@ -1,6 +1,9 @@
 //! Decoded images, kept as compact as their files store them: 8-bit images stay 8-bit and are made linear by a table.
 
-use std::io::Cursor;
+use std::{
+    io::Cursor,
+    panic::{AssertUnwindSafe, catch_unwind},
+};
 
 use image::{ColorType, ImageDecoder, codecs::hdr::HdrDecoder, codecs::png::PngDecoder};
 use zune_core::{bytestream::ZCursor, colorspace::ColorSpace as JpegColorSpace, options::DecoderOptions};
@@ -42,7 +45,14 @@ impl Image {
     /// # Errors
     /// Names the kind of file and what is wrong with it.
     pub fn decode(bytes: &[u8], color_space: ColorSpace) -> Result<Self, AssetError> {
-        match Kind::of(bytes)? {
+        let kind = Kind::of(bytes)?;
+        // The libraries have been seen to panic at damaged files, which must cost nobody more than an error.
+        catch_unwind(AssertUnwindSafe(|| Self::decode_as(kind, bytes, color_space)))
+            .unwrap_or_else(|_| Err(broken("this", &"it makes its decoder fail")))
+    }
+
+    fn decode_as(kind: Kind, bytes: &[u8], color_space: ColorSpace) -> Result<Self, AssetError> {
+        match kind {
             Kind::Png => {
                 let decoder = PngDecoder::with_limits(Cursor::new(bytes), limits()).map_err(|e| broken("PNG", &e))?;
                 decode_with("PNG", decoder, bytes.len(), color_space)

@@ -2,9 +2,11 @@
 
 use tessera_engine::{description::ColorSpace, texture::Image};
 
+use super::caught_of_libraries;
+
 /// A PNG, JPEG or Radiance HDR file: its first bytes say which.
 pub fn any(bytes: &[u8]) -> bool {
-    let Ok(image) = Image::decode(bytes, ColorSpace::Srgb) else { return false };
+    let Ok(image) = caught_of_libraries(|| Image::decode(bytes, ColorSpace::Srgb)) else { return false };
     let [width, height] = image.size().map(|edge| edge as usize);
     assert!((1..=32_768).contains(&width) && (1..=32_768).contains(&height));
     let per_pixel = image.memory() / (width * height);

@@ -1,6 +1,6 @@
 //! The coordinator's memory, as a disk may give it back.
 
-use std::{fs, panic, sync::LazyLock, time::Duration};
+use std::{fs, sync::LazyLock, time::Duration};
 
 use tessera_node::{
     farm::{Event, Farm, FarmConfig, JobId, JobSpec, LeaseId},
@@ -8,6 +8,8 @@ use tessera_node::{
     limits::{LONGEST_PATIENCE, PIXELS_PER_FRAME, SAMPLES_PER_PIXEL},
     schedule::{PartId, Probe, Split},
 };
+
+use super::caught_of_libraries;
 
 /// A segment of pixels: what it says to be stored can be read, and it goes on behind that.
 pub fn segment(bytes: &[u8]) -> bool {
@@ -84,10 +86,5 @@ pub fn database(changes: &[u8]) -> bool {
     }
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("events.redb"), &file).unwrap();
-    // A panic that is caught is none; fuzzing would end at its first word.
-    let hook = panic::take_hook();
-    panic::set_hook(Box::new(|_| ()));
-    let opened = Journal::open(folder.path(), FarmConfig::default()).is_ok();
-    panic::set_hook(hook);
-    opened
+    caught_of_libraries(|| Journal::open(folder.path(), FarmConfig::default()).is_ok())
 }
