@@ -376,8 +376,8 @@ pub const PROBE_PATCH_PER_AXIS: u32 = 4;
 /// Parts a node holds beyond those its lanes render, so that no lane waits for the network.
 pub const PREFETCH_PER_LANE: usize = 1;
 
-/// Between two looks at what nodes could take from others, for each node: a bound of the share of its time that a coordinator spends with it.
-pub const STEAL_PAUSE_PER_NODE: Duration = Duration::from_micros(20);
+/// Between two looks at how nodes could help others, for each node: a bound of the share of its time that a coordinator spends with it.
+pub const HELP_PAUSE_PER_NODE: Duration = Duration::from_micros(20);
 
 /// How often a node that found nothing worth taking from another looks again.
 pub const STEAL_INTERVAL: Duration = Duration::from_millis(200);

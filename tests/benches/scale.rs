@@ -53,11 +53,26 @@ struct Stretch {
 
 impl Bench {
     fn measure(&mut self, seconds: f64) -> Stretch {
+        self.measure_until(|| thread::sleep(Duration::from_secs_f64(seconds)))
+    }
+
+    /// The last parts of the job, when most nodes have nothing left to do: three for each node, or what there is.
+    fn tail(&mut self, rate: f64, parts: u64) -> Stretch {
+        let tally = self.fleet.tally.clone();
+        let left = move |many: u64| tally.settled() + many >= parts;
+        wait_until("the job comes to its end", 1800, || left(3 * self.nodes as u64));
+        self.ask(rate);
+        let stretch = self.measure_until(|| wait_until("all parts are on disk", 300, || left(0)));
+        print("the last parts", &stretch);
+        stretch
+    }
+
+    fn measure_until(&mut self, over: impl FnOnce()) -> Stretch {
         let (beats, settled) = (self.fleet.tally.beats(), self.fleet.tally.settled());
         drop(self.fleet.tally.take_waits());
         self.meter.look();
         self.own.look();
-        thread::sleep(Duration::from_secs_f64(seconds));
+        over();
         let (usage, own) = (self.meter.look(), self.own.look().cores);
         let rate = |now: u64, before: u64| (now - before) as f64 / usage.seconds;
         let (beats, settled) = (rate(self.fleet.tally.beats(), beats), rate(self.fleet.tally.settled(), settled));
@@ -136,9 +151,10 @@ fn main() {
             break;
         }
     }
+    let tail = bench.tail(rate, edge.div_ceil(64).pow(2) as u64);
     let begin = Instant::now();
     wait_until("the job is over", 1800, || manifest(&program).exists());
-    println!("the rest of the job and its files: {:.1} s", begin.elapsed().as_secs_f64());
+    println!("its files: {:.1} s", begin.elapsed().as_secs_f64());
     print("since then", &bench.measure(1.0));
     let end = bench.meter.look();
     println!("\n| what | goal | found | ratio |\n| --- | --- | --- | --- |");
@@ -146,6 +162,7 @@ fn main() {
         |what: &str, goal: f64, found: f64, unit: &str| println!("| {what} | {goal:.0}{unit} | {found:.2}{unit} | {:.2} |", found / goal);
     row("parts a second on disk", rate, steady.settled, "");
     row("cores at that rate", CORES, steady.usage.cores, "");
+    row("cores while the last parts run", CORES, tail.usage.cores, "");
     row("peak memory, files included (MiB)", BYTES / f64::from(1 << 20), end.peak_bytes as f64 / f64::from(1 << 20), "");
     row("most parts a second", rate, most, "");
 }

@@ -15,11 +15,13 @@ impl Job {
         open.into_iter().for_each(|lease| self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "the job is over"));
         for (id, member) in &mut self.members {
             member.queue.clear();
+            member.queued_cost = 0.0;
             if let Some(node) = nodes.get(id).filter(|node| node.lives(member.incarnation) && member.stage != Stage::Away) {
                 turn.send(*id, node, ToNode::Release { job: self.id });
             }
         }
         self.loose.clear();
+        self.queued = 0;
         self.audits.clear();
         (self.reconsider, self.next_due) = (None, None);
         self.question = None;

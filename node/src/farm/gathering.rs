@@ -49,6 +49,7 @@ impl Job {
             probed: Vec::new(),
             pace: 1.0,
             queue: Default::default(),
+            queued_cost: 0.0,
         };
         self.members.insert(id, member);
         turn.send(id, node, ToNode::Prepare { job: self.id });

@@ -67,6 +67,8 @@ impl Job {
         let queued: Vec<(PartId, NodeId)> = self.members.iter().flat_map(queued).collect();
         let queue_of: BTreeMap<PartId, NodeId> = queued.iter().copied().collect();
         expect(queued.len() == queue_of.len(), "a part waits in two queues")?;
+        expect(queued.len() == self.queued, "parts in queues are miscounted")?;
+        expect(self.members.values().all(|member| self.knows_cost(member)), "the cost of a queue is wrong")?;
         let (mut committed, mut dropped, mut leased, mut loose) = (0, 0, 0, 0);
         for part in &self.parts {
             let agrees = match part.place {
@@ -91,6 +93,11 @@ impl Job {
         let audited = |part: &PartId| self.part(*part).is_delivered();
         expect(self.audits.iter().all(audited), "a part that is not delivered is to be compared")?;
         expect(leased + committed + dropped + loose + queued.len() + self.committing.len() == self.parts.len(), "parts do not add up")
+    }
+
+    fn knows_cost(&self, member: &super::job::Member) -> bool {
+        let cost: f64 = member.queue.iter().map(|part| self.part(*part).expected).sum();
+        (cost - member.queued_cost).abs() <= 1e-6 * (1.0 + cost) || !cost.is_finite()
     }
 
     /// Every lease does what its role says, and nodes hold exactly those that are not stray.

@@ -57,16 +57,11 @@ pub(super) struct Member {
     pub pace: f64,
     /// Parts that wait for it, hardest first (on the film's order under the naive policy).
     pub queue: VecDeque<PartId>,
+    /// Expected cost of those, up to rounding.
+    pub queued_cost: f64,
 }
 
 impl Member {
-    /// Takes a part out of its queue: one near either end, as a rule.
-    pub fn take_out(&mut self, part: PartId) {
-        if let Some(at) = self.queue.iter().position(|queued| *queued == part) {
-            self.queue.remove(at);
-        }
-    }
-
     /// Throughput, once it is known (see [`crate::schedule::evaluate`]).
     pub fn power(&self) -> Option<f64> {
         self.speed.map(|speed| speed * f64::from(self.info.lanes.max(1)))
@@ -89,6 +84,8 @@ pub(super) struct Job {
     /// Parts with no node.
     pub loose: BTreeSet<PartId>,
     pub leases: BTreeMap<LeaseId, Lease>,
+    /// Number of parts in the queues of all nodes.
+    pub queued: usize,
     /// Attempts whose pixels are on their way to the disk, with their parts.
     pub committing: BTreeMap<LeaseId, PartId>,
     pub committed: usize,
@@ -114,8 +111,8 @@ pub(super) struct Job {
     pub taken: (u32, f64),
     /// When it gives up waiting for a node.
     pub gives_up: Option<Duration>,
-    /// When nodes may take from others again.
-    pub steal_after: Duration,
+    /// When nodes that run out may help others again.
+    pub help_after: Duration,
     /// When the next attempt will have taken suspiciously long.
     pub next_due: Option<Duration>,
     pub log: Log,
@@ -134,6 +131,7 @@ impl Job {
             costs: CostMap::default(),
             parts: Vec::new(),
             loose: BTreeSet::new(),
+            queued: 0,
             leases: BTreeMap::new(),
             committing: BTreeMap::new(),
             committed: 0,
@@ -144,7 +142,7 @@ impl Job {
             cost: (0.0, 0.0),
             split_into: 0,
             reconsider: None,
-            steal_after: Duration::ZERO,
+            help_after: Duration::ZERO,
             taken: (0, 0.0),
             gives_up: None,
             next_due: None,
@@ -226,7 +224,26 @@ impl Job {
 
     /// Parts that no node holds.
     pub fn waiting_parts(&self) -> usize {
-        self.loose.len() + self.members.values().map(|member| member.queue.len()).sum::<usize>()
+        self.loose.len() + self.queued
+    }
+
+    /// Puts a part at the end of the queue of a node.
+    pub fn put_in(&mut self, id: NodeId, part: PartId) {
+        let expected = self.part(part).expected;
+        let Some(member) = self.members.get_mut(&id) else { return };
+        member.queue.push_back(part);
+        member.queued_cost += expected;
+        self.queued += 1;
+    }
+
+    /// Takes a part out of the queue of a node: one near either end, as a rule.
+    pub fn take_out(&mut self, id: NodeId, part: PartId) {
+        let expected = self.part(part).expected;
+        let Some(member) = self.members.get_mut(&id) else { return };
+        let Some(at) = member.queue.iter().position(|queued| *queued == part) else { return };
+        member.queue.remove(at);
+        member.queued_cost = if member.queue.is_empty() { 0.0 } else { (member.queued_cost - expected).max(0.0) };
+        self.queued -= 1;
     }
 
     /// The samples of a whole part.

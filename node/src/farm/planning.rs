@@ -99,8 +99,8 @@ impl Job {
     /// Cost that waits at every node, handed out or not.
     pub(super) fn backlog(&self, nodes: &Nodes) -> Backlog {
         let of = |(id, member): (&NodeId, &Member)| {
-            let held = self.held_by(nodes, *id).map(|lease| lease.part);
-            (*id, held.chain(member.queue.iter().copied()).map(|part| self.part(part).expected).sum())
+            let held: f64 = self.held_by(nodes, *id).map(|lease| self.part(lease.part).expected).sum();
+            (*id, held + member.queued_cost)
         };
         self.members.iter().map(of).collect()
     }
@@ -124,9 +124,7 @@ impl Job {
             }
             self.part_mut(*part).place = Place::Queued(*node);
             self.loose.remove(part);
-            if let Some(member) = self.members.get_mut(node) {
-                member.queue.push_back(*part);
-            }
+            self.put_in(*node, *part);
             touched.insert(*node);
         }
         let on_film = self.spec.assign == Assign::Naive;

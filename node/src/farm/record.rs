@@ -1,6 +1,6 @@
 //! What the farm tells of its jobs: short for the status page, in full for the manifest.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
 use serde::Serialize;
 use tessera_engine::part::Rect;
@@ -226,7 +226,7 @@ fn record(job: &Job, now: Duration) -> JobRecord {
         first_lease: job.log.first_lease.map(|at| job.log.at(at)),
         last_commit: job.log.last_commit.map(|at| job.log.at(at)),
         probe: probe_entry(job),
-        nodes: job.members.iter().map(|(id, member)| node_entry(job, *id, member)).collect(),
+        nodes: node_entries(job),
         parts: job.parts.iter().map(|part| part.entry(&job.log)).collect(),
         difficulty: evaluate::difficulty(&parts),
         power: powers.iter().map(|node| node.id).collect(),
@@ -253,23 +253,29 @@ fn probe_entry(job: &Job) -> ProbeEntry {
     }
 }
 
-fn node_entry(job: &Job, id: NodeId, member: &super::job::Member) -> NodeEntry {
-    let mut entry = NodeEntry {
-        id,
-        name: member.info.name.clone(),
-        lanes: member.info.lanes,
-        build: member.info.build.clone(),
-        power: member.power().unwrap_or(0.0),
-        parts: 0,
-        busy: 0.0,
-        finish: 0.0,
-        probed: member.probed.clone(),
+/// Nodes of a job, with what they delivered: in one pass over the parts, for there may be many of both.
+fn node_entries(job: &Job) -> Vec<NodeEntry> {
+    let entry = |(id, member): (&NodeId, &Member)| {
+        let entry = NodeEntry {
+            id: *id,
+            name: member.info.name.clone(),
+            lanes: member.info.lanes,
+            build: member.info.build.clone(),
+            power: member.power().unwrap_or(0.0),
+            parts: 0,
+            busy: 0.0,
+            finish: 0.0,
+            probed: member.probed.clone(),
+        };
+        (*id, entry)
     };
+    let mut entries: BTreeMap<NodeId, NodeEntry> = job.members.iter().map(entry).collect();
     let attempts = job.parts.iter().flat_map(|part| &part.attempts);
-    for attempt in attempts.filter(|attempt| attempt.node == id && attempt.outcome == AttemptOutcome::Committed) {
+    for attempt in attempts.filter(|attempt| attempt.outcome == AttemptOutcome::Committed) {
+        let Some(entry) = entries.get_mut(&attempt.node) else { continue };
         entry.parts += 1;
         entry.busy += attempt.seconds.unwrap_or(0.0);
         entry.finish = entry.finish.max(attempt.end.map_or(0.0, |at| job.log.at(at)));
     }
-    entry
+    entries.into_values().collect()
 }

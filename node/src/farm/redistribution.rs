@@ -95,10 +95,8 @@ impl Job {
 
     /// Takes a part out of its queue, if it is in one, and makes it loose.
     pub(super) fn unplace(&mut self, part: PartId) {
-        if let Place::Queued(node) = self.part(part).place
-            && let Some(member) = self.members.get_mut(&node)
-        {
-            member.take_out(part);
+        if let Place::Queued(node) = self.part(part).place {
+            self.take_out(node, part);
         }
         self.part_mut(part).place = Place::Loose;
         self.loose.insert(part);

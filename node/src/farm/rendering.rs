@@ -7,7 +7,7 @@ use super::node::{Held, Node, Nodes};
 use super::part::{Lease, Place, Role};
 use super::turn::Turn;
 use super::{Command, Outcome, ToNode};
-use crate::limits::{OVERDUE_AFTER, OVERDUE_FACTOR};
+use crate::limits::{HELP_PAUSE_PER_NODE, OVERDUE_AFTER, OVERDUE_FACTOR};
 use crate::manifest::EventKind;
 use crate::schedule::{Assign, NodeId, PartId};
 
@@ -22,16 +22,36 @@ impl Job {
         }
         self.watch_progress(turn, nodes);
         self.redistribute(turn, nodes);
-        self.not_full(turn, nodes).into_iter().for_each(|id| self.fill(turn, nodes, id));
+        if self.queued > 0 {
+            self.not_full(turn, nodes).into_iter().for_each(|id| self.fill(turn, nodes, id));
+        }
+        self.help_others(turn, nodes);
+        self.finish(turn, nodes);
+    }
+
+    /// Nodes that run out help others. To look through all nodes for every part that comes in would take a large farm's coordinator more time than it
+    /// has, so it is done now and then: the more nodes, the more rarely.
+    fn help_others(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
         self.reconsider = None;
+        if turn.roomy.is_empty() || !self.may_hand_out(turn) {
+            return;
+        }
+        if turn.now < self.help_after {
+            self.reconsider = Some(self.help_after);
+            return;
+        }
+        let helpers = self.not_full(turn, nodes);
+        if helpers.is_empty() {
+            return;
+        }
+        self.help_after = turn.now + HELP_PAUSE_PER_NODE * u32::try_from(self.members.len()).unwrap_or(u32::MAX);
         if matches!(self.spec.assign, Assign::EarliestFinish) {
-            self.steal(turn, nodes);
+            self.steal(turn, nodes, helpers);
         }
         self.audit(turn, nodes);
         if matches!(self.spec.assign, Assign::EarliestFinish | Assign::Script) {
             self.shorten_tail(turn, nodes);
         }
-        self.finish(turn, nodes);
     }
 
     /// All pixels are here: files can be written.
@@ -56,7 +76,7 @@ impl Job {
             if self.part(part).suspect && !self.is_alone(nodes, id) {
                 return;
             }
-            self.members.entry(id).and_modify(|member| _ = member.queue.pop_front());
+            self.take_out(id, part);
             self.hand_over(turn, nodes, id, part);
         }
     }

@@ -13,7 +13,7 @@ use super::{
     LeaseId,
     part::{Lease, Role},
 };
-use crate::limits::{STEAL_INTERVAL, STEAL_PAUSE_PER_NODE};
+use crate::limits::STEAL_INTERVAL;
 use crate::manifest::AttemptOutcome;
 use crate::schedule::{NodeId, PartId};
 
@@ -51,17 +51,7 @@ struct Victim {
 
 impl Job {
     /// Lets nodes with room take parts from others; asks to be woken while some find nothing that is worth it.
-    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &mut Nodes) {
-        let thieves = self.not_full(turn, nodes);
-        if thieves.is_empty() {
-            return;
-        }
-        // To look through all nodes for each part that comes in would take a large farm's coordinator more time than it has.
-        if turn.now < self.steal_after {
-            self.reconsider = Some(self.steal_after);
-            return;
-        }
-        self.steal_after = turn.now + STEAL_PAUSE_PER_NODE * u32::try_from(self.members.len()).unwrap_or(u32::MAX);
+    pub(super) fn steal(&mut self, turn: &mut Turn, nodes: &mut Nodes, thieves: Vec<NodeId>) {
         let mut victims: Vec<Victim> = self.members.keys().filter_map(|id| self.victim(turn.now, nodes, *id)).collect();
         for thief in thieves {
             while self.has_room(turn, nodes, thief) && self.steal_one(turn, nodes, thief, &mut victims) {}
@@ -109,9 +99,7 @@ impl Job {
             self.call_back(turn, nodes, lease);
             self.close(turn, nodes, lease, AttemptOutcome::Cancelled, "another node was free");
         }
-        if let Some(member) = self.members.get_mut(&from) {
-            member.take_out(part);
-        }
+        self.take_out(from, part);
     }
 
     /// The last attempt that a node holds, if no lane can have begun it.
@@ -124,7 +112,7 @@ impl Job {
     fn victim(&self, now: Duration, nodes: &Nodes, id: NodeId) -> Option<Victim> {
         let (member, node) = (self.members.get(&id)?, nodes.get(&id)?);
         let last = member.queue.back().copied().or_else(|| self.not_begun(nodes, id).map(|(_, lease)| lease.part))?;
-        let cost = self.held_cost(now, nodes, id) + member.queue.iter().map(|part| self.part(*part).expected).sum::<f64>();
+        let cost = self.held_cost(now, nodes, id) + member.queued_cost;
         let (last, speed) = (self.part(last).expected, member.lane_speed());
         Some(Victim { id, finish: (cost - last).max(0.0) / (speed * node.lanes().max(1) as f64) + last / speed })
     }

@@ -8,7 +8,7 @@ use std::time::Duration;
 use tessera_engine::part::Rect;
 
 use super::LeaseId;
-use super::job::Job;
+use super::job::{Job, Member};
 use super::node::{Node, Nodes};
 use super::part::{Lease, PartState, Place, Role};
 use super::turn::Turn;
@@ -46,7 +46,12 @@ impl Job {
             let pieces = free_lanes(nodes, &idle) + 1;
             return self.cut(turn, nodes, last.part, pieces);
         }
+        let needed = stragglers.iter().map(|straggler| self.speed_needed(straggler)).fold(f64::INFINITY, f64::min);
         for id in idle {
+            let fast = |member: &Member| member.lane_speed() > needed;
+            if !self.members.get(&id).is_some_and(fast) {
+                continue;
+            }
             let Some(at) = stragglers.iter().position(|straggler| self.pays_to_race(id, straggler)) else { continue };
             let straggler = stragglers.remove(at);
             if self.lease(turn, nodes, id, straggler.part, Role::Spare).is_some() {
@@ -72,7 +77,12 @@ impl Job {
 
     fn pays_to_race(&self, id: NodeId, straggler: &Straggler) -> bool {
         let (Some(member), part) = (self.members.get(&id), self.part(straggler.part)) else { return false };
-        part.expected / member.lane_speed() < straggler.left * GAIN && !part.failed_on(id) && !part.suspect
+        member.lane_speed() > self.speed_needed(straggler) && !part.failed_on(id) && !part.suspect
+    }
+
+    /// The speed of a lane above which a second attempt at a part pays.
+    fn speed_needed(&self, straggler: &Straggler) -> f64 {
+        self.part(straggler.part).expected / (straggler.left * GAIN)
     }
 
     fn pays_to_cut(&self, nodes: &Nodes, idle: &[NodeId], straggler: &Straggler) -> bool {
