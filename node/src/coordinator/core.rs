@@ -45,6 +45,7 @@ pub struct Core {
     pub(super) farm: Farm,
     /// What the farm's clock showed when this process began.
     pub(super) offset: Duration,
+    /// When that was, later by all the time for which it was away.
     pub(super) begin: Instant,
     pub(super) shared: Shared,
     pub(super) disk: Disk,
@@ -146,23 +147,24 @@ impl Core {
         let mut publish = TokioInstant::now();
         loop {
             let deadline = self.deadline();
-            tokio::select! {
+            let received = tokio::select! {
                 received = inputs.recv_many(&mut waiting, INPUT_BATCH) => {
                     if received == 0 {
                         return;
                     }
-                    self.shared.metrics.inputs_waiting.set(i64::try_from(received + inputs.len()).unwrap_or(i64::MAX));
-                    waiting.drain(..).for_each(|input| self.handle(input));
-                    self.shared.metrics.inputs_waiting.set(i64::try_from(inputs.len()).unwrap_or(i64::MAX));
+                    received
                 }
-                () = sleep_until(deadline.unwrap_or(self.begin).into()), if deadline.is_some() => {}
-                () = sleep_until(publish), if self.changed => {}
+                () = sleep_until(deadline.unwrap_or(self.begin).into()), if deadline.is_some() => 0,
+                () = sleep_until(publish), if self.changed => 0,
+            };
+            self.note_absence();
+            if received > 0 {
+                self.shared.metrics.inputs_waiting.set(i64::try_from(received + inputs.len()).unwrap_or(i64::MAX));
+                waiting.drain(..).for_each(|input| self.handle(input));
+                self.shared.metrics.inputs_waiting.set(i64::try_from(inputs.len()).unwrap_or(i64::MAX));
             }
-            if self.deadline().is_some_and(|deadline| deadline <= Instant::now()) {
-                self.due = None;
-            }
-            if let Some(deadline) = self.deadline().filter(|deadline| *deadline <= Instant::now()) {
-                self.tick(deadline);
+            if self.is_due() {
+                self.tick();
             }
             if self.changed && TokioInstant::now() >= publish {
                 self.publish();
@@ -177,13 +179,31 @@ impl Core {
         due.map(|at| self.begin + at.saturating_sub(self.offset))
     }
 
-    /// Time has come. If it is long past, this process itself was away, and the silence of others says nothing.
-    fn tick(&mut self, deadline: Instant) {
-        if deadline.elapsed() > LATE_TICK {
-            tracing::warn!("this process did not run for a while: nodes are given time to be heard");
-            let all: Vec<_> = self.links.iter().map(|(node, link)| (*node, link.incarnation)).collect();
-            all.into_iter().for_each(|(node, incarnation)| self.step(Event::NodeHeard { node, incarnation }));
+    /// Whether the core is to be told of the time now. Signs of life may have put that off.
+    fn is_due(&mut self) -> bool {
+        if self.deadline().is_some_and(|deadline| deadline <= Instant::now()) {
+            self.due = None;
         }
+        self.deadline().is_some_and(|deadline| deadline <= Instant::now())
+    }
+
+    /// If it is long past the time at which this was to wake up, the process itself was away: that time does not count, and the silence of others says
+    /// nothing.
+    fn note_absence(&mut self) {
+        if !self.is_due() {
+            return;
+        }
+        let late = self.deadline().map_or(Duration::ZERO, |deadline| deadline.elapsed());
+        if late <= LATE_TICK {
+            return;
+        }
+        tracing::warn!(seconds = late.as_secs_f64(), "this process did not run for a while: nodes are given time to be heard");
+        self.begin += late;
+        let all: Vec<_> = self.links.iter().map(|(node, link)| (*node, link.incarnation)).collect();
+        all.into_iter().for_each(|(node, incarnation)| self.step(Event::NodeHeard { node, incarnation }));
+    }
+
+    fn tick(&mut self) {
         self.step(Event::Tick);
         for (node, link) in &mut self.links {
             let suspected = self.farm.is_suspected(*node);
@@ -245,16 +265,25 @@ impl Core {
                 self.unanswered.remove(&job).into_iter().for_each(|reply| drop(reply.send(Ok(job))));
             }
             Input::Delete { job, reply } => drop(reply.send(self.delete(job))),
-            Input::Release { node, reply } => drop(reply.send(self.release(&node))),
-            Input::Move { job, place, reason, reply } => {
-                let event = match place {
-                    Place::Paused => Event::JobPaused { job, reason },
-                    Place::Resumed => Event::JobResumed { job, reason },
-                    Place::Ranked(priority) => Event::JobRanked { job, priority },
-                };
-                let _ = reply.send(self.change_open(job, event));
+            Input::Release { node, reply } => {
+                let done = self.release(&node);
+                self.answer(reply, done);
             }
-            Input::Cancel { job, reason, reply } => drop(reply.send(self.change_open(job, Event::JobCancelled { job, reason }))),
+            Input::Move { job, place, operator, reason, reply } => {
+                let done = self.may_move(job, place, operator).and_then(|()| {
+                    let event = match place {
+                        Place::Paused => Event::JobPaused { job, reason, operator },
+                        Place::Resumed => Event::JobResumed { job, reason },
+                        Place::Ranked(priority) => Event::JobRanked { job, priority, operator },
+                    };
+                    self.change_open(job, event)
+                });
+                self.answer(reply, done);
+            }
+            Input::Cancel { job, reason, reply } => {
+                let done = self.change_open(job, Event::JobCancelled { job, reason });
+                self.answer(reply, done);
+            }
         }
     }
 

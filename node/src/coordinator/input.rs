@@ -98,6 +98,8 @@ pub enum Input {
         job: JobId,
         /// Where to.
         place: Place,
+        /// Whether an operator says so.
+        operator: bool,
         /// Who.
         reason: String,
         /// Whether there was such a job.

@@ -17,7 +17,7 @@ use crate::{
     farm::{Event, JobId, JobSnapshot, Outcome},
     job::JobDescription,
     limits::{DISK_RETRY, JOBS_FOR_OPERATORS, JOBS_PER_SUBMITTER, JOBS_WAITING, JOURNAL_EVENTS},
-    wire::{JobState, Terms},
+    wire::{JobState, Place, Terms},
 };
 
 /// Clients that wait to hear that their job is taken.
@@ -108,6 +108,25 @@ impl Core {
         }
         self.step(event);
         Ok(())
+    }
+
+    /// What an operator said of a job's place in the queue, others do not change.
+    pub(super) fn may_move(&self, job: JobId, place: Place, operator: bool) -> Result<(), String> {
+        let fixed = self.farm.fixed(job);
+        let said = match place {
+            Place::Resumed if fixed.pause => "paused it",
+            Place::Ranked(_) if fixed.rank => "gave it its priority",
+            _ => return Ok(()),
+        };
+        if operator { Ok(()) } else { Err(format!("job {}: an operator {said}, and an operator alone changes that", job.0)) }
+    }
+
+    /// Answers a client when what was done is on disk, or no crash could take it back; at once where the disk refuses, for that may last.
+    pub(super) fn answer(&self, reply: oneshot::Sender<Result<(), String>>, done: Result<(), String>) {
+        if done.is_err() || self.disk_trouble.is_some() {
+            return drop(reply.send(done));
+        }
+        self.disk.then(move || drop(reply.send(done)));
     }
 
     pub(super) fn answer_when_taken(&mut self, job: JobId, reply: oneshot::Sender<Result<JobId, String>>) {

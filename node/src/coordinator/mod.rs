@@ -176,6 +176,10 @@ impl Coordinator {
             metrics: metrics.clone(),
         };
         let core = Core::new(farm, shared.clone(), disk, thinker, canary, published)?;
+        // Before anyone is served it is on disk that this process began: a crash must not let another one give the same names to other attempts.
+        let (on_disk, begun) = oneshot::channel();
+        core.disk.then(move || _ = on_disk.send(()));
+        let _ = begun.await;
         let keeping = tokio::spawn(housekeeping::keep(shared.clone(), options.retention));
         let following = tokio::spawn(revoked::follow(revoked, revocations));
         let tasks = [tokio::spawn(core.run(received)), tokio::spawn(accept(endpoint.clone(), shared)), keeping, following];

@@ -100,7 +100,7 @@ async fn move_job(shared: &Shared, client: &Peer, job: JobId, place: Place) -> R
         submission::check_priority(priority)?;
     }
     let (reply, answer) = oneshot::channel();
-    shared.ask(Input::Move { job, place, reason: format!("by {client}"), reply }, answer).await
+    shared.ask(Input::Move { job, place, operator: client.role == Role::Operator, reason: format!("by {client}"), reply }, answer).await
 }
 
 /// Operators alone put jobs before those of others.

@@ -118,6 +118,8 @@ pub enum Event {
         job: JobId,
         /// Who, or why.
         reason: String,
+        /// Whether an operator says so: then nobody else lets it go on (see [`Farm::fixed`](super::Farm::fixed)).
+        operator: bool,
     },
     /// It need not wait any more.
     JobResumed {
@@ -132,6 +134,8 @@ pub enum Event {
         job: JobId,
         /// Its new priority.
         priority: i32,
+        /// Whether an operator says so: then nobody else changes it.
+        operator: bool,
     },
     /// A node connected and proved its certificate.
     NodeJoined {

@@ -52,8 +52,8 @@ impl Farm {
     pub fn difference(&self, other: &Self) -> Option<String> {
         let node = self.nodes.iter().find(|(id, node)| other.nodes.get(id) != Some(node));
         let job = self.jobs.iter().find(|(id, job)| other.jobs.get(id) != Some(job));
-        let node = node.map(|(id, node)| format!("{node:?} against {:?}", other.nodes.get(id)));
-        let job = job.map(|(id, job)| format!("{job:?} against {:?}", other.jobs.get(id)));
+        let node = node.map(|(id, node)| apart(&Some(node), &other.nodes.get(id)));
+        let job = job.map(|(id, job)| format!("job {}: {}", id.0, apart(&Some(job), &other.jobs.get(id))));
         let names = (self.turn.last_name, self.turn.build, &self.earlier_builds, &self.queue, self.nodes.len(), self.jobs.len());
         let others = (other.turn.last_name, other.turn.build, &other.earlier_builds, &other.queue, other.nodes.len(), other.jobs.len());
         node.or(job).or_else(|| (names != others).then(|| format!("{names:?} against {others:?}")))
@@ -115,6 +115,14 @@ impl Job {
         let held: usize = nodes.values().map(|node| node.held_of(self.id).count()).sum();
         expect(held == self.leases.values().filter(|lease| lease.role != Role::Stray).count(), "an attempt that counts is held by nobody")
     }
+}
+
+/// The first lines in which two things, printed, differ.
+fn apart<T: std::fmt::Debug>(one: &T, other: &T) -> String {
+    let (one, other) = (format!("{one:#?}"), format!("{other:#?}"));
+    let at = one.lines().zip(other.lines()).take_while(|(a, b)| a == b).count();
+    let from = |text: &str| text.lines().skip(at.saturating_sub(3)).take(6).map(str::trim).collect::<Vec<_>>().join(" ");
+    format!("{} against {}", from(&one), from(&other))
 }
 
 fn expect(holds: bool, wrong: &str) -> Result<(), String> {

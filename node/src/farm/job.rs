@@ -13,7 +13,7 @@ use super::part::{Lease, PartState};
 use super::planning::Pending;
 use super::probing::{Pricing, Probing};
 use super::turn::Turn;
-use super::{Build, FarmConfig, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
+use super::{Build, FarmConfig, Fixed, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
 use crate::schedule::{CostMap, NodeId, NodePower, PartId};
 
 /// How far a job is.
@@ -77,6 +77,8 @@ pub(super) struct Job {
     pub build: Option<Build>,
     /// Whether nothing of it is handed out, for someone wants it to wait.
     pub paused: bool,
+    /// What of its place in the queue an operator said.
+    pub fixed: Fixed,
     pub members: BTreeMap<NodeId, Member>,
     pub pricing: Pricing,
     pub costs: CostMap,
@@ -126,6 +128,7 @@ impl Job {
             phase: Phase::Waiting,
             build: None,
             paused: false,
+            fixed: Fixed::default(),
             members: BTreeMap::new(),
             pricing: Pricing::Unknown,
             costs: CostMap::default(),

@@ -44,7 +44,7 @@ pub use config::FarmConfig;
 pub use event::{Answer, Build, Event, JobSpec, NodeInfo};
 pub use id::{Incarnation, JobId, LeaseId, PolicyId};
 pub use node::{NodeSnapshot, NodeState};
-pub use record::{JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
+pub use record::{Fixed, JobPhase, JobRecord, JobSnapshot, PartPhase, PartSnapshot};
 
 use delivering::Delivery;
 use job::Job;

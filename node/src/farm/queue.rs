@@ -55,9 +55,11 @@ impl Farm {
     pub(super) fn job_moved(&mut self, event: Event) {
         self.queue.stale = true;
         match event {
-            Event::JobPaused { job, reason } => self.with_job(job, |job, turn, _| job.pause(turn, reason)),
+            Event::JobPaused { job, reason, operator } => self.with_job(job, |job, turn, _| job.pause(turn, reason, operator)),
             Event::JobResumed { job, reason } => self.with_job(job, |job, turn, _| job.resume(turn, reason)),
-            Event::JobRanked { job, priority } => self.with_job(job, |job, _, _| job.spec.priority = priority),
+            Event::JobRanked { job, priority, operator } => {
+                self.with_job(job, |job, _, _| (job.spec.priority, job.fixed.rank) = (priority, operator));
+            }
             _ => {}
         }
     }
@@ -265,13 +267,15 @@ impl Job {
     }
 
     /// Nothing of it is handed out any more; what nodes hold they finish.
-    fn pause(&mut self, turn: &super::turn::Turn, reason: String) {
+    fn pause(&mut self, turn: &super::turn::Turn, reason: String, operator: bool) {
+        self.fixed.pause |= operator;
         if !std::mem::replace(&mut self.paused, true) {
             self.log.event(turn.now, EventKind::Paused, None, Vec::new(), reason);
         }
     }
 
     fn resume(&mut self, turn: &super::turn::Turn, reason: String) {
+        self.fixed.pause = false;
         if std::mem::take(&mut self.paused) {
             self.log.event(turn.now, EventKind::Resumed, None, Vec::new(), reason);
         }

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, time::Duration};
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tessera_engine::part::Rect;
 
 use super::job::{Job, Member, Phase};
@@ -10,6 +10,15 @@ use super::part::{PartState, Place};
 use super::{Build, Farm, JobId, JobSpec, LeaseId, NodeSnapshot, Outcome};
 use crate::manifest::{AttemptOutcome, EventEntry, NodeEntry, PartEntry, ProbeEntry};
 use crate::schedule::{NodeId, Part, PartId, Probe, evaluate};
+
+/// What of a job's place in the queue an operator said: nobody else changes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Fixed {
+    /// That it waits.
+    pub pause: bool,
+    /// Its priority.
+    pub rank: bool,
+}
 
 /// How far a job is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -147,6 +156,11 @@ impl Farm {
             }
         };
         self.nodes.iter().map(of).collect()
+    }
+
+    /// What an operator said of a job's place in the queue.
+    pub fn fixed(&self, job: JobId) -> Fixed {
+        self.jobs.get(&job).map_or(Fixed::default(), |job| job.fixed)
     }
 
     /// All that is known of a job; `None` if it is not known (any more). Parts, nodes and events are known until another job ends.

@@ -29,6 +29,8 @@ pub(super) struct Node {
     pub fails_next: bool,
     /// Whether the next part that a lane begins makes it hang.
     pub hangs_next: bool,
+    /// What the next part is taken to have lasted, in seconds.
+    pub measures_next: Option<f64>,
     /// Whether its pixels are wrong.
     pub corrupt: bool,
     /// The build that its process is of.
@@ -65,6 +67,7 @@ impl Node {
             slowness: 1.0,
             fails_next: false,
             hangs_next: false,
+            measures_next: None,
             corrupt: false,
             build: 0,
             paused: Duration::ZERO,
@@ -196,6 +199,7 @@ impl Node {
             Event::RenderFailed { node, incarnation, job, lease, reason: "the lane panicked".into() }
         } else {
             let hash = true_hash(job, self.build, rect).map(|byte| if self.corrupt { byte ^ (1 + self.id.0 as u8) } else { byte });
+            let seconds = self.measures_next.take().unwrap_or(seconds);
             Event::Rendered { node, incarnation, job, lease, hash, seconds }
         };
         self.delivered.insert(lease, (job, event.clone()));

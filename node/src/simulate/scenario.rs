@@ -59,11 +59,17 @@ pub enum Fault {
     DamagePixels,
     /// The coordinator's process stands still for so long.
     Stall(Duration),
+    /// The coordinator's disk takes nothing for so long.
+    FullDisk(Duration),
+    /// The coordinator's clock jumps forward by so much. (It goes back when the coordinator is started anew: to what its journal tells.)
+    JumpClock(Duration),
+    /// The machine's clock jumps while it renders its next part: that is taken to last so many seconds.
+    JumpNodeClock(usize, f64),
     /// Parts take so many times longer from now on.
     Slow(usize, f64),
     /// The next part that the machine finishes fails instead.
     FailPart(usize),
-    /// The coordinator is killed and started anew: what is not on disk is gone, connections are made anew.
+    /// The coordinator is killed and started anew: what is not on disk is gone, or a part of it; connections are made anew.
     RestartCoordinator,
     /// A user cancels a job.
     Cancel(JobId),
@@ -243,7 +249,7 @@ impl Scenario {
     /// Something goes wrong somewhere; who was killed often comes back. Machine 0 comes back always.
     fn add_fault(&mut self, random: &mut Random) {
         let (at, machine) = (random.seconds(0.0, 8.0), random.below(self.machines.len() as u32) as usize);
-        let fault = match random.below(30) {
+        let fault = match random.below(36) {
             0..=5 => Fault::Kill(machine),
             6 => Fault::Leave(machine),
             7..=10 => Fault::Pause(machine, random.seconds(0.1, 15.0)),
@@ -260,6 +266,10 @@ impl Scenario {
             25 => Fault::Stall(random.seconds(0.05, 20.0)),
             26 => Fault::Drain(machine, random.seconds(0.0, 5.0)),
             27 => Fault::Upgrade,
+            28 | 29 => Fault::FullDisk(random.seconds(0.05, 20.0)),
+            30 => Fault::JumpClock(random.seconds(0.0, 10.0)),
+            31 => Fault::JumpClock(random.seconds(10.0, 10_000.0)),
+            32 => Fault::JumpNodeClock(machine, [0.0, 1e-9, 1e6, 1e300][random.below(4) as usize]),
             _ if random.happens(0.1) => Fault::Cancel(JobId(1 + u64::from(random.below(1 + self.others.len() as u32)))),
             _ => Fault::RestartCoordinator,
         };

@@ -30,11 +30,30 @@ enum Happening {
     Closed(usize, u64),
     /// Pixels of a part are on disk.
     Stored(JobId, LeaseId, PartId, u64),
+    /// So many entries of the journal are on disk.
+    Synced(usize, u64),
     /// A node that drains has no more time.
     Goes(usize, u64),
     /// A job is submitted.
     Submit(JobId, Box<JobSpec>),
     Fault(Fault),
+}
+
+/// What a crash of the coordinator leaves, and what it may take.
+struct Disk {
+    journal: Vec<(Duration, Event)>,
+    /// Entries of it that no crash takes any more.
+    synced: usize,
+    /// Whether a wait for the disk is under way.
+    syncing: bool,
+    /// Until when it refuses everything.
+    full: Duration,
+    /// Pixels in segments, by job and attempt.
+    pixels: BTreeMap<(JobId, LeaseId), PartId>,
+    /// Pixels on their way there.
+    coming: BTreeMap<(JobId, LeaseId), PartId>,
+    /// Ends of jobs that are told of when so many entries are synced.
+    ends: Vec<(usize, JobId, Outcome)>,
 }
 
 /// A simulation while it runs.
@@ -44,6 +63,8 @@ pub struct World {
     pub(super) farm: Farm,
     pub(super) nodes: Vec<Node>,
     pub(super) now: Duration,
+    /// What the coordinator's clock shows beyond `now`, in nanoseconds: it goes on from where a journal ends, and may jump.
+    ahead: i64,
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
     epoch: u64,
@@ -54,9 +75,9 @@ pub struct World {
     /// Whether pixels of a part are to be found damaged.
     damaged: bool,
     filter: Filter,
-    journal: Vec<(Duration, Event)>,
-    /// Parts on disk, with the attempt whose pixels they are.
-    disk: BTreeMap<(JobId, PartId), LeaseId>,
+    disk: Disk,
+    /// Parts that are committed, with the attempt whose pixels they are.
+    settled: BTreeMap<(JobId, PartId), LeaseId>,
     /// Attempts whose pixels do not count any more.
     revoked: BTreeSet<LeaseId>,
     /// Deliveries that the farm has to say something about.
@@ -81,6 +102,7 @@ impl World {
             farm,
             nodes,
             now: Duration::ZERO,
+            ahead: 0,
             agenda: BinaryHeap::new(),
             happenings: Vec::new(),
             epoch: 0,
@@ -88,8 +110,16 @@ impl World {
             stalled: Duration::ZERO,
             damaged: false,
             filter: Filter::default(),
-            journal: begin.into_iter().map(|event| (Duration::ZERO, event)).collect(),
-            disk: BTreeMap::new(),
+            disk: Disk {
+                journal: begin.into_iter().map(|event| (Duration::ZERO, event)).collect(),
+                synced: 2,
+                syncing: false,
+                full: Duration::ZERO,
+                pixels: BTreeMap::new(),
+                coming: BTreeMap::new(),
+                ends: Vec::new(),
+            },
+            settled: BTreeMap::new(),
             revoked: BTreeSet::new(),
             open: BTreeSet::new(),
             killed: BTreeMap::new(),
@@ -121,7 +151,8 @@ impl World {
     pub fn run(mut self) -> Run {
         while !self.is_over() && self.run.violations.is_empty() && self.now < self.scenario.horizon {
             let next = self.agenda.peek().map(|Reverse((at, ..))| *at);
-            match (self.farm.next_deadline().map(|deadline| deadline.max(self.stalled)), next) {
+            let deadline = self.farm.next_deadline().map(|deadline| shifted(deadline, -self.ahead).max(self.stalled));
+            match (deadline, next) {
                 (Some(deadline), next) if next.is_none_or(|next| deadline < next) => {
                     self.now = self.now.max(deadline);
                     self.tick();
@@ -147,20 +178,36 @@ impl World {
         self.run.outcome.is_some() && self.run.others.len() == self.scenario.others.len()
     }
 
-    /// Time has come. If it is long past, the coordinator itself was away: it gives all nodes time to be heard, as the real one does.
     fn tick(&mut self) {
-        let late = self.farm.next_deadline().is_some_and(|deadline| self.now > deadline + LATE_TICK);
+        self.wake();
+        if self.farm.next_deadline().is_some_and(|deadline| deadline <= self.clock()) {
+            self.step(Event::Tick);
+        }
+    }
+
+    /// If it is long past the time at which the coordinator was to wake up, it was away, or its clock jumped: that time does not count, and nodes have time
+    /// to be heard, as with the real one.
+    fn wake(&mut self) {
+        let Some(late) = self.farm.next_deadline().and_then(|deadline| self.clock().checked_sub(deadline)) else { return };
+        if late <= LATE_TICK {
+            return;
+        }
+        self.ahead -= late.as_nanos() as i64;
         for node in 0..self.nodes.len() {
-            if late && self.nodes[node].alive {
+            if self.nodes[node].alive {
                 let (node, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
                 self.step(Event::NodeHeard { node, incarnation });
             }
         }
-        self.step(Event::Tick);
     }
 
     pub(super) fn violation(&mut self, what: impl Into<String>) {
         self.run.violations.push(format!("at {:.3} s: {}", self.now.as_secs_f64(), what.into()));
+    }
+
+    /// What the coordinator's clock shows.
+    fn clock(&self) -> Duration {
+        shifted(self.now, self.ahead)
     }
 
     fn plan(&mut self, at: Duration, happening: Happening) {
@@ -174,6 +221,9 @@ impl World {
         let Some(happening) = self.happenings[index].take() else { return };
         if let Some(later) = self.held_up(&happening) {
             return self.plan(later, happening);
+        }
+        if !matches!(happening, Happening::Fault(_)) {
+            self.wake();
         }
         match happening {
             Happening::Farm(event, epoch) if epoch == self.epoch => self.step(event),
@@ -193,6 +243,7 @@ impl World {
                 self.store(job, lease, part);
                 self.step(Event::Committed { job, lease });
             }
+            Happening::Synced(entries, epoch) if epoch == self.epoch => self.synced(entries),
             Happening::Submit(job, spec) => self.step(Event::JobSubmitted { job, spec: *spec }),
             Happening::Goes(node, life) if self.lives(node, life) => self.fault(Fault::Leave(node)),
             Happening::Fault(fault) => self.fault(fault),
@@ -215,7 +266,10 @@ impl World {
             Happening::FromNode(_, node, life, _) => {
                 (true, self.stalled.max(if self.lives(*node, *life) { self.nodes[*node].mute } else { self.stalled }))
             }
-            Happening::Farm(..) | Happening::Stored(..) | Happening::Submit(..) => (true, self.stalled),
+            Happening::Farm(Event::Assembled { .. }, _) | Happening::Stored(..) | Happening::Synced(..) => {
+                (true, self.stalled.max(self.disk.full))
+            }
+            Happening::Farm(..) | Happening::Submit(..) => (true, self.stalled),
             Happening::Fault(_) => return None,
         };
         (node && until > self.now).then_some(until)
@@ -274,27 +328,57 @@ impl World {
         }
     }
 
+    /// Pixels are on disk, and what was noted before them.
     fn store(&mut self, job: JobId, lease: LeaseId, part: PartId) {
+        self.disk.coming.remove(&(job, lease));
+        self.disk.pixels.insert((job, lease), part);
+        self.settle(job, lease, part);
+    }
+
+    fn settle(&mut self, job: JobId, lease: LeaseId, part: PartId) {
         if self.revoked.contains(&lease) {
             return;
         }
-        if let Some(first) = self.disk.insert((job, part), lease) {
+        if let Some(first) = self.settled.insert((job, part), lease) {
             self.violation(format!("part {} is committed twice, by leases {} and {}", part.0, first.0, lease.0));
         }
     }
 
     fn step(&mut self, event: Event) {
-        let news = self.filter.admit(&self.farm, self.now, &event);
-        self.journal.extend(news);
+        let now = self.clock();
+        let news = self.filter.admit(&self.farm, now, &event);
+        self.note(news);
         let plain = matches!(&event, Event::NodeHeard { node, .. } if !self.farm.is_suspected(*node));
         self.run.steps += 1;
-        let commands = self.farm.step(self.now, event.clone());
+        let commands = self.farm.step(now, event.clone());
         if !plain {
             self.judge();
             self.note_detections();
             self.trace.update(format!("{:?}{event:?}{commands:?}", self.now).as_bytes());
         }
         commands.into_iter().for_each(|command| self.carry_out(command));
+    }
+
+    /// Appends to the journal, and sees to it that it comes to the disk.
+    fn note(&mut self, news: Vec<(Duration, Event)>) {
+        self.disk.journal.extend(news);
+        let entries = self.disk.journal.len();
+        if entries > self.disk.synced && !self.disk.syncing {
+            self.disk.syncing = true;
+            let at = self.now + Duration::from_secs_f64(self.scenario.disk * self.random.between(0.5, 2.0));
+            self.plan(at, Happening::Synced(entries, self.epoch));
+        }
+    }
+
+    /// What waited for the disk is done.
+    fn synced(&mut self, entries: usize) {
+        self.disk.synced = self.disk.synced.max(entries);
+        self.disk.syncing = false;
+        let synced = self.disk.synced;
+        for (_, job, outcome) in self.disk.ends.extract_if(.., |(at, ..)| *at <= synced).collect::<Vec<_>>() {
+            self.end(job, outcome);
+        }
+        self.note(Vec::new());
     }
 
     fn carry_out(&mut self, command: Command) {
@@ -318,17 +402,19 @@ impl World {
                     self.violation(format!("lease {} is to be committed, but its pixels are not here", lease.0));
                 }
                 let at = self.now + Duration::from_secs_f64(self.scenario.disk * self.random.between(0.5, 2.0));
+                self.disk.coming.insert((job, lease), part);
+                self.plan(at, Happening::Synced(self.disk.journal.len(), self.epoch));
                 self.plan(at, Happening::Stored(job, lease, part, self.epoch));
             }
             Command::Discard { lease, .. } => _ = self.open.remove(&lease),
             Command::Revoke { job, part, lease } => {
                 self.revoked.insert(lease);
-                if self.disk.get(&(job, part)) == Some(&lease) {
-                    self.disk.remove(&(job, part));
+                if self.settled.get(&(job, part)) == Some(&lease) {
+                    self.settled.remove(&(job, part));
                 }
             }
             Command::Assemble { job } => self.assemble(job),
-            Command::End { job, outcome } => self.end(job, outcome),
+            Command::End { job, outcome } => self.disk.ends.push((self.disk.journal.len(), job, outcome)),
         }
     }
 
@@ -381,7 +467,7 @@ impl World {
         if let Err(wrong) = split::validate(&rects, record.spec.width, record.spec.height) {
             self.violation(format!("the picture is not whole: {wrong}"));
         }
-        if committed.iter().any(|(part, _, lease)| self.disk.get(&(job, *part)) != Some(lease)) {
+        if committed.iter().any(|(part, _, lease)| self.settled.get(&(job, *part)) != Some(lease)) {
             self.violation("the farm takes parts for committed that are not on disk");
         }
         self.judge_pixels(job, &record);
@@ -429,6 +515,9 @@ impl World {
             Fault::Hang(node) => self.nodes[node].hangs_next = true,
             Fault::Corrupt(node) => self.nodes[node].corrupt = true,
             Fault::DamagePixels => self.damaged = true,
+            Fault::FullDisk(length) => self.disk.full = self.disk.full.max(self.now + length),
+            Fault::JumpClock(length) => self.ahead += length.as_nanos() as i64,
+            Fault::JumpNodeClock(node, seconds) => self.nodes[node].measures_next = Some(seconds),
             Fault::Stall(length) => self.stalled = self.stalled.max(self.now + length),
             Fault::Slow(node, factor) => self.nodes[node].slowness = factor,
             Fault::FailPart(node) => self.nodes[node].fails_next = true,
@@ -438,9 +527,9 @@ impl World {
                 self.restart();
             }
             Fault::Cancel(job) => self.step(Event::JobCancelled { job, reason: "not wanted".into() }),
-            Fault::PauseJob(job) => self.step(Event::JobPaused { job, reason: "another goes first".into() }),
+            Fault::PauseJob(job) => self.step(Event::JobPaused { job, reason: "another goes first".into(), operator: false }),
             Fault::ResumeJob(job) => self.step(Event::JobResumed { job, reason: "its turn".into() }),
-            Fault::Rank(job, priority) => self.step(Event::JobRanked { job, priority }),
+            Fault::Rank(job, priority) => self.step(Event::JobRanked { job, priority, operator: false }),
             Fault::Drain(node, length) if self.nodes[node].alive => {
                 let (id, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
                 self.say(node, 0.0, Event::NodeDraining { node: id, incarnation });
@@ -451,18 +540,23 @@ impl World {
         }
     }
 
-    /// The coordinator dies and comes back with what its journal tells, which must be what it knew.
+    /// The coordinator dies and comes back with what is on its disk: all that was synced, and perhaps some of what was on its way.
     fn restart(&mut self) {
-        self.journal.extend(self.filter.flush());
-        let mut again = Farm::new(self.scenario.config.clone());
-        for (at, event) in &self.journal {
-            again.step(*at, event.clone());
-        }
-        if let Some(difference) = self.farm.difference(&again) {
-            self.violation(format!("the replayed journal differs: {difference}"));
-        }
-        (self.farm, self.epoch) = (again, self.epoch + 1);
+        self.check_replay();
+        let unsynced = (self.disk.journal.len() - self.disk.synced) as u32;
+        let lost = self.disk.journal.split_off(self.disk.synced + self.random.below(unsynced + 1) as usize);
+        self.disk.ends.retain(|(at, ..)| *at <= self.disk.journal.len());
+        self.farm = self.replayed();
+        self.filter = Filter::default();
+        (self.epoch, self.disk.syncing) = (self.epoch + 1, false);
+        self.ahead = self.farm.now().as_nanos() as i64 - self.now.as_nanos() as i64;
+        self.recover_pixels();
         self.step(Event::Restarted { build: canary(self.build) });
+        self.open.clear();
+        self.synced(self.disk.journal.len());
+        self.check_settled();
+        // Who was not answered asks again.
+        lost.into_iter().map(|(_, event)| event).filter(is_of_user).for_each(|event| self.step(event));
         for node in 0..self.nodes.len() {
             if self.nodes[node].alive {
                 let joined = self.nodes[node].joined();
@@ -471,6 +565,75 @@ impl World {
             }
         }
     }
+
+    fn replayed(&self) -> Farm {
+        let mut farm = Farm::new(self.scenario.config.clone());
+        for (at, event) in &self.disk.journal {
+            farm.step(*at, event.clone());
+        }
+        farm
+    }
+
+    /// The whole journal tells what the farm knows.
+    fn check_replay(&mut self) {
+        let entries = self.disk.journal.len();
+        self.disk.journal.extend(self.filter.flush());
+        if let Some(difference) = self.farm.difference(&self.replayed()) {
+            self.violation(format!("the replayed journal differs: {difference}"));
+        }
+        self.disk.journal.truncate(entries);
+    }
+
+    /// Pixels that reached the disk when their commit did not; those on their way may have or not.
+    fn recover_pixels(&mut self) {
+        for ((job, lease), part) in std::mem::take(&mut self.disk.coming) {
+            if self.random.happens(0.5) {
+                self.disk.pixels.insert((job, lease), part);
+            }
+        }
+        let open: Vec<JobId> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
+        for (job, lease) in self.disk.pixels.keys().copied().filter(|(job, _)| open.contains(job)).collect::<Vec<_>>() {
+            if !self.farm.committed(job).iter().any(|(_, _, committed)| *committed == lease) {
+                self.step(Event::Committed { job, lease });
+            }
+        }
+    }
+
+    /// No part that was committed is to be rendered again, and what is taken for committed is on disk.
+    fn check_settled(&mut self) {
+        let before = std::mem::take(&mut self.settled);
+        for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id) {
+            for (part, _, lease) in self.farm.committed(job) {
+                if !self.disk.pixels.contains_key(&(job, lease)) {
+                    self.violation(format!("part {} of job {} is taken for committed, and is not on disk", part.0, job.0));
+                }
+                // What a crash took may have revoked it.
+                self.revoked.remove(&lease);
+                self.settled.insert((job, part), lease);
+            }
+            let lost = before.iter().find(|((of, part), lease)| *of == job && self.settled.get(&(job, *part)) != Some(lease));
+            if let Some(((_, part), lease)) = lost {
+                self.violation(format!("part {} of job {}, committed by lease {}, is lost with the coordinator", part.0, job.0, lease.0));
+            }
+        }
+    }
+}
+
+/// Whether a user said it, who waits for an answer until it is on disk.
+fn is_of_user(event: &Event) -> bool {
+    matches!(
+        event,
+        Event::JobSubmitted { .. }
+            | Event::JobCancelled { .. }
+            | Event::JobPaused { .. }
+            | Event::JobResumed { .. }
+            | Event::JobRanked { .. }
+    )
+}
+
+fn shifted(at: Duration, nanoseconds: i64) -> Duration {
+    let by = Duration::from_nanos(nanoseconds.unsigned_abs());
+    if nanoseconds < 0 { at.saturating_sub(by) } else { at + by }
 }
 
 impl Run {

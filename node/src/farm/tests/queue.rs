@@ -93,7 +93,7 @@ fn a_higher_priority_goes_first_whoever_came_before() {
     bench.deliver(1);
     bench.deliver(1);
     assert_eq!((bench.running(1).len(), bench.running(2).len()), (0, 2));
-    bench.does(Event::JobRanked { job: JobId(1), priority: 20 });
+    bench.does(Event::JobRanked { job: JobId(1), priority: 20, operator: false });
     bench.deliver(2);
     bench.deliver(2);
     assert_eq!((bench.running(1).len(), bench.running(2).len()), (2, 0));
@@ -141,7 +141,7 @@ fn who_comes_late_makes_up_for_nothing() {
 fn a_paused_job_gets_nothing_new_and_keeps_what_it_has() {
     let mut bench = bench(1);
     bench.submit(1, |_| ());
-    bench.does(Event::JobPaused { job: JobId(1), reason: "by ann".into() });
+    bench.does(Event::JobPaused { job: JobId(1), reason: "by ann".into(), operator: false });
     bench.deliver(1);
     bench.deliver(1);
     assert_eq!(bench.running(1).len(), 0);
@@ -265,7 +265,7 @@ fn no_submitter_holds_up_the_others() {
     let mut bench = bench(1);
     for job in 1..=8 {
         bench.submit(job, |spec| spec.owner = "ann".into());
-        bench.does(Event::JobPaused { job: JobId(job), reason: "by ann".into() });
+        bench.does(Event::JobPaused { job: JobId(job), reason: "by ann".into(), operator: false });
         bench.prepare();
     }
     bench.submit(9, |spec| spec.owner = "ann".into());
