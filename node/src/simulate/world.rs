@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::{cmp::Reverse, time::Duration};
 
+use super::disk::Disk;
 use super::machine::{Act, Node, Task, canary};
 use super::random::Random;
 use super::{Fault, Run, Scenario, ScriptPolicy};
@@ -15,7 +16,7 @@ use crate::schedule::{NodeId, PartId, assign, split};
 const JOB: JobId = JobId(1);
 
 /// What happens at a moment.
-enum Happening {
+pub(super) enum Happening {
     /// The farm learns of something, unless the coordinator was started anew since (its epoch).
     Farm(Event, u64),
     /// The same, from a node in one of its lives.
@@ -39,49 +40,32 @@ enum Happening {
     Fault(Fault),
 }
 
-/// What a crash of the coordinator leaves, and what it may take.
-struct Disk {
-    journal: Vec<(Duration, Event)>,
-    /// Entries of it that no crash takes any more.
-    synced: usize,
-    /// Whether a wait for the disk is under way.
-    syncing: bool,
-    /// Until when it refuses everything.
-    full: Duration,
-    /// Pixels in segments, by job and attempt.
-    pixels: BTreeMap<(JobId, LeaseId), PartId>,
-    /// Pixels on their way there.
-    coming: BTreeMap<(JobId, LeaseId), PartId>,
-    /// Ends of jobs that are told of when so many entries are synced.
-    ends: Vec<(usize, JobId, Outcome)>,
-}
-
 /// A simulation while it runs.
 pub struct World {
     pub(super) scenario: Scenario,
-    random: Random,
+    pub(super) random: Random,
     pub(super) farm: Farm,
     pub(super) nodes: Vec<Node>,
     pub(super) now: Duration,
     /// What the coordinator's clock shows beyond `now`, in nanoseconds: it goes on from where a journal ends, and may jump.
-    ahead: i64,
+    pub(super) ahead: i64,
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
-    epoch: u64,
+    pub(super) epoch: u64,
     /// The build that is installed.
-    build: u32,
+    pub(super) build: u32,
     /// Until when the coordinator stands still.
     stalled: Duration,
     /// Whether pixels of a part are to be found damaged.
     damaged: bool,
-    filter: Filter,
-    disk: Disk,
+    pub(super) filter: Filter,
+    pub(super) disk: Disk,
     /// Parts that are committed, with the attempt whose pixels they are.
-    settled: BTreeMap<(JobId, PartId), LeaseId>,
+    pub(super) settled: BTreeMap<(JobId, PartId), LeaseId>,
     /// Attempts whose pixels do not count any more.
-    revoked: BTreeSet<LeaseId>,
+    pub(super) revoked: BTreeSet<LeaseId>,
     /// Deliveries that the farm has to say something about.
-    open: BTreeSet<LeaseId>,
+    pub(super) open: BTreeSet<LeaseId>,
     pub(super) killed: BTreeMap<usize, Duration>,
     trace: blake3::Hasher,
     pub(super) run: Run,
@@ -210,7 +194,7 @@ impl World {
         shifted(self.now, self.ahead)
     }
 
-    fn plan(&mut self, at: Duration, happening: Happening) {
+    pub(super) fn plan(&mut self, at: Duration, happening: Happening) {
         self.agenda.push(Reverse((at, self.happenings.len() as u64, self.happenings.len())));
         self.happenings.push(Some(happening));
     }
@@ -275,7 +259,7 @@ impl World {
         (node && until > self.now).then_some(until)
     }
 
-    fn delay(&mut self) -> Duration {
+    pub(super) fn delay(&mut self) -> Duration {
         let (low, high) = self.scenario.network.delay;
         self.random.seconds(low, high)
     }
@@ -297,7 +281,7 @@ impl World {
         }
     }
 
-    fn say(&mut self, node: usize, seconds: f64, event: Event) {
+    pub(super) fn say(&mut self, node: usize, seconds: f64, event: Event) {
         let at = self.now + Duration::from_secs_f64(seconds) + self.delay();
         let (life, epoch) = (self.nodes[node].life, self.epoch);
         if self.random.happens(self.scenario.network.duplication) {
@@ -328,23 +312,7 @@ impl World {
         }
     }
 
-    /// Pixels are on disk, and what was noted before them.
-    fn store(&mut self, job: JobId, lease: LeaseId, part: PartId) {
-        self.disk.coming.remove(&(job, lease));
-        self.disk.pixels.insert((job, lease), part);
-        self.settle(job, lease, part);
-    }
-
-    fn settle(&mut self, job: JobId, lease: LeaseId, part: PartId) {
-        if self.revoked.contains(&lease) {
-            return;
-        }
-        if let Some(first) = self.settled.insert((job, part), lease) {
-            self.violation(format!("part {} is committed twice, by leases {} and {}", part.0, first.0, lease.0));
-        }
-    }
-
-    fn step(&mut self, event: Event) {
+    pub(super) fn step(&mut self, event: Event) {
         let now = self.clock();
         let news = self.filter.admit(&self.farm, now, &event);
         self.note(news);
@@ -357,28 +325,6 @@ impl World {
             self.trace.update(format!("{:?}{event:?}{commands:?}", self.now).as_bytes());
         }
         commands.into_iter().for_each(|command| self.carry_out(command));
-    }
-
-    /// Appends to the journal, and sees to it that it comes to the disk.
-    fn note(&mut self, news: Vec<(Duration, Event)>) {
-        self.disk.journal.extend(news);
-        let entries = self.disk.journal.len();
-        if entries > self.disk.synced && !self.disk.syncing {
-            self.disk.syncing = true;
-            let at = self.now + Duration::from_secs_f64(self.scenario.disk * self.random.between(0.5, 2.0));
-            self.plan(at, Happening::Synced(entries, self.epoch));
-        }
-    }
-
-    /// What waited for the disk is done.
-    fn synced(&mut self, entries: usize) {
-        self.disk.synced = self.disk.synced.max(entries);
-        self.disk.syncing = false;
-        let synced = self.disk.synced;
-        for (_, job, outcome) in self.disk.ends.extract_if(.., |(at, ..)| *at <= synced).collect::<Vec<_>>() {
-            self.end(job, outcome);
-        }
-        self.note(Vec::new());
     }
 
     fn carry_out(&mut self, command: Command) {
@@ -447,7 +393,7 @@ impl World {
         }
     }
 
-    fn end(&mut self, job: JobId, outcome: Outcome) {
+    pub(super) fn end(&mut self, job: JobId, outcome: Outcome) {
         if job != JOB {
             if self.run.others.insert(job, outcome).is_some() {
                 self.violation(format!("job {} ends twice", job.0));
@@ -539,96 +485,6 @@ impl World {
             Fault::Leave(_) | Fault::Drain(..) => {}
         }
     }
-
-    /// The coordinator dies and comes back with what is on its disk: all that was synced, and perhaps some of what was on its way.
-    fn restart(&mut self) {
-        self.check_replay();
-        let unsynced = (self.disk.journal.len() - self.disk.synced) as u32;
-        let lost = self.disk.journal.split_off(self.disk.synced + self.random.below(unsynced + 1) as usize);
-        self.disk.ends.retain(|(at, ..)| *at <= self.disk.journal.len());
-        self.farm = self.replayed();
-        self.filter = Filter::default();
-        (self.epoch, self.disk.syncing) = (self.epoch + 1, false);
-        self.ahead = self.farm.now().as_nanos() as i64 - self.now.as_nanos() as i64;
-        self.recover_pixels();
-        self.step(Event::Restarted { build: canary(self.build) });
-        self.open.clear();
-        self.synced(self.disk.journal.len());
-        self.check_settled();
-        // Who was not answered asks again.
-        lost.into_iter().map(|(_, event)| event).filter(is_of_user).for_each(|event| self.step(event));
-        for node in 0..self.nodes.len() {
-            if self.nodes[node].alive {
-                let joined = self.nodes[node].joined();
-                let seconds = self.random.between(0.05, 1.0);
-                self.say(node, seconds, joined);
-            }
-        }
-    }
-
-    fn replayed(&self) -> Farm {
-        let mut farm = Farm::new(self.scenario.config.clone());
-        for (at, event) in &self.disk.journal {
-            farm.step(*at, event.clone());
-        }
-        farm
-    }
-
-    /// The whole journal tells what the farm knows.
-    fn check_replay(&mut self) {
-        let entries = self.disk.journal.len();
-        self.disk.journal.extend(self.filter.flush());
-        if let Some(difference) = self.farm.difference(&self.replayed()) {
-            self.violation(format!("the replayed journal differs: {difference}"));
-        }
-        self.disk.journal.truncate(entries);
-    }
-
-    /// Pixels that reached the disk when their commit did not; those on their way may have or not.
-    fn recover_pixels(&mut self) {
-        for ((job, lease), part) in std::mem::take(&mut self.disk.coming) {
-            if self.random.happens(0.5) {
-                self.disk.pixels.insert((job, lease), part);
-            }
-        }
-        let open: Vec<JobId> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
-        for (job, lease) in self.disk.pixels.keys().copied().filter(|(job, _)| open.contains(job)).collect::<Vec<_>>() {
-            if !self.farm.committed(job).iter().any(|(_, _, committed)| *committed == lease) {
-                self.step(Event::Committed { job, lease });
-            }
-        }
-    }
-
-    /// No part that was committed is to be rendered again, and what is taken for committed is on disk.
-    fn check_settled(&mut self) {
-        let before = std::mem::take(&mut self.settled);
-        for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id) {
-            for (part, _, lease) in self.farm.committed(job) {
-                if !self.disk.pixels.contains_key(&(job, lease)) {
-                    self.violation(format!("part {} of job {} is taken for committed, and is not on disk", part.0, job.0));
-                }
-                // What a crash took may have revoked it.
-                self.revoked.remove(&lease);
-                self.settled.insert((job, part), lease);
-            }
-            let lost = before.iter().find(|((of, part), lease)| *of == job && self.settled.get(&(job, *part)) != Some(lease));
-            if let Some(((_, part), lease)) = lost {
-                self.violation(format!("part {} of job {}, committed by lease {}, is lost with the coordinator", part.0, job.0, lease.0));
-            }
-        }
-    }
-}
-
-/// Whether a user said it, who waits for an answer until it is on disk.
-fn is_of_user(event: &Event) -> bool {
-    matches!(
-        event,
-        Event::JobSubmitted { .. }
-            | Event::JobCancelled { .. }
-            | Event::JobPaused { .. }
-            | Event::JobResumed { .. }
-            | Event::JobRanked { .. }
-    )
 }
 
 fn shifted(at: Duration, nanoseconds: i64) -> Duration {
