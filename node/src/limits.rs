@@ -133,6 +133,9 @@ pub const SWEEP_INTERVAL: Duration = Duration::from_secs(600);
 /// How often the farm's status is published to those who watch.
 pub const STATUS_INTERVAL: Duration = Duration::from_millis(100);
 
+/// While a deadline is set, the coordinator's core looks at the clock at least this often, so that it knows for how long it was away.
+pub const WAKE_INTERVAL: Duration = Duration::from_secs(1);
+
 /// A deadline missed by more than this means that the coordinator itself did not run.
 pub const LATE_TICK: Duration = Duration::from_millis(300);
 

@@ -26,7 +26,7 @@ use super::{
 use crate::{
     error::Result,
     farm::{self, Build, Command, DiscardReason, Event, Farm, Incarnation, JobId, JobPhase, LeaseId},
-    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL},
+    limits::{INPUT_BATCH, LATE_TICK, STATUS_INTERVAL, WAKE_INTERVAL},
     schedule::NodeId,
     web::Snapshot,
     wire::{FromNode, PartHeader, Place, Status, ToNode},
@@ -47,6 +47,8 @@ pub struct Core {
     pub(super) offset: Duration,
     /// When that was, later by all the time for which it was away.
     pub(super) begin: Instant,
+    /// When it last looked at the clock.
+    pub(super) awake: Instant,
     pub(super) shared: Shared,
     pub(super) disk: Disk,
     pub(super) thinker: Thinker,
@@ -101,6 +103,7 @@ impl Core {
             offset: farm.now(),
             farm,
             begin: Instant::now(),
+            awake: Instant::now(),
             shared,
             disk,
             thinker,
@@ -145,8 +148,9 @@ impl Core {
     pub async fn run(mut self, mut inputs: mpsc::Receiver<Input>) {
         let mut waiting = Vec::new();
         let mut publish = TokioInstant::now();
+        self.awake = Instant::now();
         loop {
-            let deadline = self.deadline();
+            let wake = self.wake_time();
             let received = tokio::select! {
                 received = inputs.recv_many(&mut waiting, INPUT_BATCH) => {
                     if received == 0 {
@@ -154,7 +158,7 @@ impl Core {
                     }
                     received
                 }
-                () = sleep_until(deadline.unwrap_or(self.begin).into()), if deadline.is_some() => 0,
+                () = sleep_until(wake.unwrap_or(self.begin).into()), if wake.is_some() => 0,
                 () = sleep_until(publish), if self.changed => 0,
             };
             self.note_absence();
@@ -171,6 +175,11 @@ impl Core {
                 publish = TokioInstant::now() + STATUS_INTERVAL;
             }
         }
+    }
+
+    /// When this is to wake up, whatever comes in.
+    fn wake_time(&mut self) -> Option<Instant> {
+        self.deadline().map(|deadline| deadline.min(self.awake + WAKE_INTERVAL))
     }
 
     /// When the core wants to be told of the time.
@@ -190,15 +199,16 @@ impl Core {
     /// If it is long past the time at which this was to wake up, the process itself was away: that time does not count, and the silence of others says
     /// nothing.
     fn note_absence(&mut self) {
-        if !self.is_due() {
-            return;
-        }
-        let late = self.deadline().map_or(Duration::ZERO, |deadline| deadline.elapsed());
+        self.is_due(); // or signs of life have put it off
+        let late = self.wake_time().map_or(Duration::ZERO, |wake| wake.elapsed());
+        self.awake = Instant::now();
         if late <= LATE_TICK {
             return;
         }
         tracing::warn!(seconds = late.as_secs_f64(), "this process did not run for a while: nodes are given time to be heard");
-        self.begin += late;
+        // The farm's clock never goes back: what it was told meanwhile counts.
+        let now = self.offset + self.begin.elapsed();
+        self.begin += late.min(now.saturating_sub(self.farm.now()));
         let all: Vec<_> = self.links.iter().map(|(node, link)| (*node, link.incarnation)).collect();
         all.into_iter().for_each(|(node, incarnation)| self.step(Event::NodeHeard { node, incarnation }));
     }

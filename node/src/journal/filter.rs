@@ -9,7 +9,8 @@ use crate::schedule::NodeId;
 /// Leaves out what changes nothing: ticks before a deadline, and all signs of life but the last before a deadline strikes.
 #[derive(Clone, Debug, Default)]
 pub struct Filter {
-    heard: BTreeMap<NodeId, (Duration, Incarnation)>,
+    /// By life, for one that is over may still be heard, and changes nothing.
+    heard: BTreeMap<(NodeId, Incarnation), Duration>,
 }
 
 impl Filter {
@@ -17,7 +18,7 @@ impl Filter {
     pub fn admit(&mut self, farm: &Farm, now: Duration, event: &Event) -> Vec<(Duration, Event)> {
         match event {
             Event::NodeHeard { node, incarnation } if !farm.is_suspected(*node) => {
-                self.heard.insert(*node, (now, *incarnation));
+                self.heard.insert((*node, *incarnation), now);
                 Vec::new()
             }
             Event::Tick if farm.next_deadline().is_none_or(|deadline| deadline > now) => Vec::new(),
@@ -33,7 +34,7 @@ impl Filter {
     /// The signs of life that were left out, in order of time.
     pub fn flush(&mut self) -> Vec<(Duration, Event)> {
         let heard = std::mem::take(&mut self.heard);
-        let entry = |(node, (at, incarnation))| (at, Event::NodeHeard { node, incarnation });
+        let entry = |((node, incarnation), at)| (at, Event::NodeHeard { node, incarnation });
         let mut entries: Vec<(Duration, Event)> = heard.into_iter().map(entry).collect();
         entries.sort_by_key(|(at, _)| *at);
         entries

@@ -4,6 +4,7 @@
 //! a [`Run`] tells what came of it. The same scenario gives the same run, to the last command.
 
 mod campaign;
+mod clock;
 mod disk;
 mod judge;
 mod machine;

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use std::{cmp::Reverse, time::Duration};
 
+use super::clock::shifted;
 use super::disk::Disk;
 use super::machine::{Act, Node, Task, canary};
 use super::random::Random;
 use super::{Fault, Run, Scenario, ScriptPolicy};
 use crate::farm::{Answer, Command, Event, Farm, Incarnation, JobId, JobSpec, LeaseId, Outcome, Question, ToNode};
 use crate::journal::Filter;
-use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT, LATE_TICK};
+use crate::limits::{HEARTBEAT_INTERVAL, IDLE_TIMEOUT};
 use crate::schedule::{NodeId, PartId, assign, split};
 
 /// The job that a run tells most of.
@@ -49,13 +50,15 @@ pub struct World {
     pub(super) now: Duration,
     /// What the coordinator's clock shows beyond `now`, in nanoseconds: it goes on from where a journal ends, and may jump.
     pub(super) ahead: i64,
+    /// By when the coordinator would have woken up, on its clock, had it not been away since.
+    pub(super) awake: Option<Duration>,
     agenda: BinaryHeap<Reverse<(Duration, u64, usize)>>,
     happenings: Vec<Option<Happening>>,
     pub(super) epoch: u64,
     /// The build that is installed.
     pub(super) build: u32,
     /// Until when the coordinator stands still.
-    stalled: Duration,
+    pub(super) stalled: Duration,
     /// Whether pixels of a part are to be found damaged.
     damaged: bool,
     pub(super) filter: Filter,
@@ -87,6 +90,7 @@ impl World {
             nodes,
             now: Duration::ZERO,
             ahead: 0,
+            awake: None,
             agenda: BinaryHeap::new(),
             happenings: Vec::new(),
             epoch: 0,
@@ -162,36 +166,8 @@ impl World {
         self.run.outcome.is_some() && self.run.others.len() == self.scenario.others.len()
     }
 
-    fn tick(&mut self) {
-        self.wake();
-        if self.farm.next_deadline().is_some_and(|deadline| deadline <= self.clock()) {
-            self.step(Event::Tick);
-        }
-    }
-
-    /// If it is long past the time at which the coordinator was to wake up, it was away, or its clock jumped: that time does not count, and nodes have time
-    /// to be heard, as with the real one.
-    fn wake(&mut self) {
-        let Some(late) = self.farm.next_deadline().and_then(|deadline| self.clock().checked_sub(deadline)) else { return };
-        if late <= LATE_TICK {
-            return;
-        }
-        self.ahead -= late.as_nanos() as i64;
-        for node in 0..self.nodes.len() {
-            if self.nodes[node].alive {
-                let (node, incarnation) = (self.nodes[node].id, self.nodes[node].incarnation());
-                self.step(Event::NodeHeard { node, incarnation });
-            }
-        }
-    }
-
     pub(super) fn violation(&mut self, what: impl Into<String>) {
         self.run.violations.push(format!("at {:.3} s: {}", self.now.as_secs_f64(), what.into()));
-    }
-
-    /// What the coordinator's clock shows.
-    fn clock(&self) -> Duration {
-        shifted(self.now, self.ahead)
     }
 
     pub(super) fn plan(&mut self, at: Duration, happening: Happening) {
@@ -462,9 +438,9 @@ impl World {
             Fault::Corrupt(node) => self.nodes[node].corrupt = true,
             Fault::DamagePixels => self.damaged = true,
             Fault::FullDisk(length) => self.disk.full = self.disk.full.max(self.now + length),
-            Fault::JumpClock(length) => self.ahead += length.as_nanos() as i64,
+            Fault::JumpClock(length) => self.jump(length),
             Fault::JumpNodeClock(node, seconds) => self.nodes[node].measures_next = Some(seconds),
-            Fault::Stall(length) => self.stalled = self.stalled.max(self.now + length),
+            Fault::Stall(length) => self.stall(length),
             Fault::Slow(node, factor) => self.nodes[node].slowness = factor,
             Fault::FailPart(node) => self.nodes[node].fails_next = true,
             Fault::RestartCoordinator => self.restart(),
@@ -485,11 +461,6 @@ impl World {
             Fault::Leave(_) | Fault::Drain(..) => {}
         }
     }
-}
-
-fn shifted(at: Duration, nanoseconds: i64) -> Duration {
-    let by = Duration::from_nanos(nanoseconds.unsigned_abs());
-    if nanoseconds < 0 { at.saturating_sub(by) } else { at + by }
 }
 
 impl Run {
