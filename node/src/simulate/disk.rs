@@ -76,11 +76,12 @@ impl World {
         self.filter = Filter::default();
         (self.epoch, self.disk.syncing) = (self.epoch + 1, false);
         self.ahead = self.farm.now().as_nanos() as i64 - self.now.as_nanos() as i64;
+        let before = self.settled.clone();
         self.recover_pixels();
+        self.check_settled(&before);
         self.step(Event::Restarted { build: canary(self.build) });
         self.open.clear();
         self.synced(self.disk.journal.len());
-        self.check_settled();
         // Who was not answered asks again.
         lost.into_iter().map(|(_, event)| event).filter(is_of_user).for_each(|event| self.step(event));
         for node in 0..self.nodes.len() {
@@ -118,16 +119,19 @@ impl World {
             }
         }
         let open: Vec<JobId> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
-        for (job, lease) in self.disk.pixels.keys().copied().filter(|(job, _)| open.contains(job)).collect::<Vec<_>>() {
+        let stored: Vec<_> = self.disk.pixels.iter().map(|((job, lease), part)| (*job, *lease, *part)).collect();
+        for (job, lease, part) in stored.into_iter().filter(|(job, ..)| open.contains(job)) {
             if !self.farm.committed(job).iter().any(|(_, _, committed)| *committed == lease) {
+                // It may be the last one, and then the picture is made at once.
+                self.settled.entry((job, part)).or_insert(lease);
                 self.step(Event::Committed { job, lease });
             }
         }
     }
 
     /// No part that was committed is to be rendered again, and what is taken for committed is on disk.
-    fn check_settled(&mut self) {
-        let before = std::mem::take(&mut self.settled);
+    fn check_settled(&mut self, before: &BTreeMap<(JobId, PartId), LeaseId>) {
+        self.settled.clear();
         for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id) {
             for (part, _, lease) in self.farm.committed(job) {
                 if !self.disk.pixels.contains_key(&(job, lease)) {
