@@ -135,3 +135,28 @@ fn a_node_that_is_told_to_end_hands_in_what_it_renders() {
     assert!(vain.is_empty(), "{vain:?}");
     farm.coordinator.kill();
 }
+
+/// What an operator says of a job's place in the queue, its submitter does not change; what the submitter said, it does.
+#[test]
+fn an_operators_word_on_a_job_stays() {
+    let farm = Farm::new();
+    let ann = |arguments: &[&str]| farm.client("keys/submitter-ann.pem", arguments);
+    let job = ann(&["submit", "job.lua"]).lines[0].clone();
+    for command in [["pause", &job], ["resume", &job]] {
+        assert_eq!(ann(&command).code, Some(0), "{command:?}");
+    }
+    assert_eq!(ann(&["rank", "--priority", "-7", &job]).code, Some(0));
+    farm.operator(&["pause", &job]);
+    farm.operator(&["rank", "--priority", "-3", &job]);
+    for (command, said) in [(vec!["resume", &job], "paused it"), (vec!["rank", "--priority", "-1", &job], "gave it its priority")] {
+        let refused = ann(&command);
+        assert!(refused.code != Some(0) && refused.errors.contains(&format!("an operator {said}")), "{refused:?}");
+    }
+    farm.wait_for_job(&job, |known| known["paused"] == true && known["priority"] == -3);
+    farm.operator(&["resume", &job]);
+    farm.wait_for_job(&job, |known| known["paused"] == false);
+    for command in [["pause", &job], ["cancel", &job]] {
+        assert_eq!(ann(&command).code, Some(0), "{command:?}");
+    }
+    farm.coordinator.kill();
+}
