@@ -128,7 +128,8 @@ fn a_policy_that_fails_when_parts_are_redistributed_is_replaced_and_the_manifest
   end,"#,
     );
     fs::write(program.path("job.lua"), script).unwrap();
-    let mut render = program.start(&["render", "job.lua", "--nodes", "3", "--lanes", "1", "-o", "out", "--json"]);
+    // Long enough that the others are not done before the silence of the one that dies is noticed.
+    let mut render = program.start(&["render", "job.lua", "--set", "samples=256", "--nodes", "3", "--lanes", "1", "-o", "out", "--json"]);
     render.progress(0.2);
     signal(render.node("node-2"), Signal::KILL);
     let finished = render.finish();
@@ -136,6 +137,6 @@ fn a_policy_that_fails_when_parts_are_redistributed_is_replaced_and_the_manifest
     let manifest = manifest(&program.path("out/job.manifest.json"));
     assert_each_part_committed_once(&manifest);
     let warnings = manifest["warnings"].to_string();
-    assert!(warnings.contains("three nodes or nothing"), "{warnings}");
+    assert!(warnings.contains("three nodes or nothing"), "{warnings} {}", manifest["events"]);
     assert!(manifest["events"].as_array().unwrap().iter().any(|event| event["kind"] == "policy_replaced"));
 }

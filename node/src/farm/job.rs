@@ -16,6 +16,9 @@ use super::turn::Turn;
 use super::{Build, FarmConfig, Fixed, Incarnation, JobId, JobSpec, LeaseId, NodeInfo, Outcome};
 use crate::schedule::{CostMap, NodeId, NodePower, PartId};
 
+/// The share of a queue's cost below which what is left of it is summed up anew.
+const LEAST_KEPT: f64 = 1e-6;
+
 /// How far a job is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) enum Phase {
@@ -245,8 +248,11 @@ impl Job {
         let Some(member) = self.members.get_mut(&id) else { return };
         let Some(at) = member.queue.iter().position(|queued| *queued == part) else { return };
         member.queue.remove(at);
-        member.queued_cost = if member.queue.is_empty() { 0.0 } else { (member.queued_cost - expected).max(0.0) };
         self.queued -= 1;
+        let (all, left) = (member.queued_cost, member.queued_cost - expected);
+        // Beside a part that was nearly all of it, what is left was lost in rounding.
+        let kept = left > all * LEAST_KEPT;
+        member.queued_cost = if kept { left } else { member.queue.iter().map(|part| self.parts[part.0 as usize].expected).sum() };
     }
 
     /// The samples of a whole part.
