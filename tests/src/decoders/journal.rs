@@ -5,7 +5,7 @@ use std::{fs, sync::LazyLock, time::Duration};
 use tessera_node::{
     farm::{Event, Farm, FarmConfig, JobId, JobSpec, LeaseId},
     journal::{Journal, Segment},
-    limits::{LONGEST_PATIENCE, PIXELS_PER_FRAME, SAMPLES_PER_PIXEL},
+    limits::{LANES, LONGEST_PATIENCE, PIXELS_PER_FRAME, SAMPLES_PER_PIXEL},
     schedule::{PartId, Probe, Split},
 };
 
@@ -55,7 +55,11 @@ pub fn events(mut bytes: &[u8]) -> bool {
 
 /// What the coordinator lets through to the core, of jobs that are small enough to be tried often.
 fn is_possible(event: &Event) -> bool {
-    let Event::JobSubmitted { spec, .. } = event else { return true };
+    let spec = match event {
+        Event::JobSubmitted { spec, .. } => spec,
+        Event::NodeJoined { info, .. } => return (1..=LANES).contains(&info.lanes),
+        _ => return true,
+    };
     let pixels = u64::from(spec.width) * u64::from(spec.height);
     (1..=PIXELS_PER_FRAME.min(1 << 14)).contains(&pixels)
         && (1..=u64::from(SAMPLES_PER_PIXEL)).contains(&spec.samples)
