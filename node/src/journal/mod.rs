@@ -15,12 +15,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::time::Duration;
 
+use redb::backends::FileBackend;
 use redb::{Database, ReadableDatabase, ReadableTable, ReadableTableMetadata, TableDefinition};
 
 pub use filter::Filter;
 pub use segment::PixelReader;
 #[doc(hidden)]
 pub use segment::Segment;
+
+use tessera_engine::output::write_atomically;
 
 use crate::error::{Error, ExitCode, Result};
 use crate::farm::{Event, Farm, FarmConfig, JobId, LeaseId};
@@ -73,19 +76,21 @@ impl Journal {
     fn open_believed(folder: &Path, config: FarmConfig) -> Result<(Self, Recovered)> {
         std::fs::create_dir_all(folder).map_err(|error| failed(folder, "make the folder", &error))?;
         let path = folder.join("events.redb");
-        let database = Database::create(&path).map_err(|error| match error {
+        if !path.exists() {
+            begin(&path)?;
+        }
+        let database = Database::open(&path).map_err(|error| match error {
             redb::DatabaseError::DatabaseAlreadyOpen => failed(&path, "open the journal", "another coordinator uses it")
                 .with_help("end that one, or choose another folder with --data"),
             error => failed(&path, "open the journal", &error),
         })?;
-        let mut journal =
-            Self { database: Some(database), next: 0, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
-        let read = journal.replay(config).map_err(|error| failed(&path, "read the journal", &*error))?;
+        let read = replay(&database, config).map_err(|error| failed(&path, "read the journal", &*error))?;
         let Some((farm, events)) = read else {
             return Err(failed(&path, "read the journal", "another version of tessera wrote it")
                 .with_help("let that version end its jobs, then move the folder `journal` away; finished jobs stay where they are"));
         };
-        journal.next = events;
+        let mut journal =
+            Self { database: Some(database), next: events, pending: Vec::new(), pixels: BTreeMap::new(), folder: folder.to_owned() };
         if events > JOURNAL_EVENTS {
             journal.renew(&farm)?;
         }
@@ -93,34 +98,6 @@ impl Journal {
         journal.drop_pixels_but_of(&open)?;
         open.into_iter().try_for_each(|job| journal.segment(job).map(drop))?;
         Ok((journal, Recovered { farm, events }))
-    }
-
-    /// The farm as events, and a snapshot before them, tell; and how many events. `None` if they are of another format.
-    fn replay(&mut self, config: FarmConfig) -> Result<Option<(Farm, u64)>, Box<dyn std::error::Error + Send + Sync>> {
-        let reading = self.database()?.begin_read()?;
-        let table = match reading.open_table(EVENTS) {
-            Ok(table) => table,
-            Err(redb::TableError::TableDoesNotExist(_)) => return Ok(Some((Farm::new(config), 0))),
-            Err(error) => return Err(error.into()),
-        };
-        let beginning = match reading.open_table(BEGINNING) {
-            Ok(beginning) => beginning.get(FORMAT)?,
-            Err(redb::TableError::TableDoesNotExist(_)) => None,
-            Err(error) => return Err(error.into()),
-        };
-        let Some(beginning) = beginning else { return Ok(None) };
-        let mut farm = match beginning.value() {
-            [] => Farm::new(config),
-            coded => postcard::from_bytes::<Farm>(coded)?.resumed(config),
-        };
-        let mut count = 0;
-        for entry in table.iter()? {
-            let (number, value) = entry?;
-            let (at, coded) = value.value();
-            farm.step(Duration::from_nanos(at), postcard::from_bytes(coded)?);
-            count = number.value() + 1;
-        }
-        Ok(Some((farm, count)))
     }
 
     /// Appends what [`Filter::admit`] says of events, in order. It is durable after the next [`Self::sync`].
@@ -154,7 +131,7 @@ impl Journal {
     fn database(&mut self) -> Result<&mut Database, redb::DatabaseError> {
         let database = match self.database.take() {
             Some(database) => database,
-            None => Database::create(self.folder.join("events.redb"))?,
+            None => Database::open(self.folder.join("events.redb"))?,
         };
         Ok(self.database.insert(database))
     }
@@ -293,6 +270,46 @@ impl Drop for Journal {
         let database = self.database.take();
         let _ = catch_unwind(AssertUnwindSafe(|| drop(database)));
     }
+}
+
+/// Makes the file of a journal in which nothing stands yet. What a crash leaves of a database that is being made cannot be opened: so it takes its name when
+/// it is whole.
+fn begin(path: &Path) -> Result<()> {
+    let made = write_atomically(path, |file| {
+        let database = Database::builder()
+            .create_with_backend(FileBackend::new(file.get_ref().try_clone()?).map_err(io::Error::other)?)
+            .map_err(io::Error::other)?;
+        put(&database, 0, &[], None).map_err(io::Error::other)
+    });
+    made.map_err(|error| failed(path, "begin the journal", &error.reason))
+}
+
+/// The farm as events, and a snapshot before them, tell; and how many events. `None` if they are of another format.
+fn replay(database: &Database, config: FarmConfig) -> Result<Option<(Farm, u64)>, Box<dyn std::error::Error + Send + Sync>> {
+    let reading = database.begin_read()?;
+    let table = match reading.open_table(EVENTS) {
+        Ok(table) => table,
+        Err(redb::TableError::TableDoesNotExist(_)) => return Ok(Some((Farm::new(config), 0))),
+        Err(error) => return Err(error.into()),
+    };
+    let beginning = match reading.open_table(BEGINNING) {
+        Ok(beginning) => beginning.get(FORMAT)?,
+        Err(redb::TableError::TableDoesNotExist(_)) => None,
+        Err(error) => return Err(error.into()),
+    };
+    let Some(beginning) = beginning else { return Ok(None) };
+    let mut farm = match beginning.value() {
+        [] => Farm::new(config),
+        coded => postcard::from_bytes::<Farm>(coded)?.resumed(config),
+    };
+    let mut count = 0;
+    for entry in table.iter()? {
+        let (number, value) = entry?;
+        let (at, coded) = value.value();
+        farm.step(Duration::from_nanos(at), postcard::from_bytes(coded)?);
+        count = number.value() + 1;
+    }
+    Ok(Some((farm, count)))
 }
 
 fn put(

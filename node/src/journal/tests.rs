@@ -1,3 +1,5 @@
+mod disk;
+
 use super::*;
 use crate::farm::{Build, Command, Incarnation, JobSpec, NodeInfo, ToNode};
 use crate::schedule::{Assign, CostMap, NodeId, Probe, Split};
