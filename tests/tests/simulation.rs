@@ -54,6 +54,23 @@ fn no_schedule_loses_a_part_or_commits_one_twice() {
     }
 }
 
+/// Schedules of long campaigns, one in many thousands, that broke a promise once.
+#[test]
+fn schedules_that_broke_promises_once_keep_them() {
+    let once = [
+        (43_050, "a node whose only lane hangs was given back what it could not get to, and nobody noticed"),
+        (580_327, "the same, with several jobs"),
+        (103_231, "a node was asked twice to compare the same part"),
+        (646_610, "attempts found on disk let the farm give names again that a crash had made it forget: wrong pixels"),
+        (272_300, "a quarantine was lost with the coordinator, and the pixels that it had revoked were back"),
+    ];
+    for (seed, what) in once {
+        let scenario = Scenario::chaos(seed);
+        let broken = broken_by(&scenario, &World::new(scenario.clone()).run());
+        assert_eq!(broken, None, "again: {what}\nreplay it: tessera simulate --schedule {seed}");
+    }
+}
+
 /// A job that all nodes leave for ever is broken for the judge: the one fault that does it is found among others.
 #[test]
 fn a_broken_schedule_shrinks_to_what_breaks_it() {

@@ -128,19 +128,21 @@ impl Core {
 
     /// Steps through what the journal alone does not know: parts whose pixels reached the disk when their commit did not.
     fn recover(&mut self) -> Result<()> {
-        for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()) {
-            if self.jobs.get(&job.id).is_none_or(|known| known.stored.is_none()) {
-                let reason = "its description on the coordinator's disk cannot be read any more".to_owned();
-                self.step(Event::JobCancelled { job: job.id, reason });
-                continue;
-            }
-            let committed: BTreeSet<LeaseId> = self.farm.committed(job.id).into_iter().map(|(_, _, lease)| lease).collect();
-            for lease in self.disk.pixels.stored(job.id)?.into_iter().filter(|lease| !committed.contains(lease)) {
-                self.step(Event::Committed { job: job.id, lease });
-            }
+        let open: Vec<JobId> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
+        let is_described = |job: &JobId| self.jobs.get(job).is_some_and(|known| known.stored.is_some());
+        let (described, lost): (Vec<JobId>, Vec<JobId>) = open.into_iter().partition(is_described);
+        let mut stored = Vec::new();
+        for job in described {
+            let committed: BTreeSet<LeaseId> = self.farm.committed(job).into_iter().map(|(_, _, lease)| lease).collect();
+            let on_disk = self.disk.pixels.stored(job)?;
+            stored.extend(on_disk.into_iter().filter(|lease| !committed.contains(lease)).map(|lease| (job, lease)));
         }
         let build = Build { revision: tessera_engine::REVISION, canary: self.canary.hash };
-        self.step(Event::Restarted { build });
+        self.step(Event::Restarted { build, stored });
+        for job in lost {
+            let reason = "its description on the coordinator's disk cannot be read any more".to_owned();
+            self.step(Event::JobCancelled { job, reason });
+        }
         Ok(())
     }
 

@@ -56,12 +56,13 @@ impl Job {
         if self.audits.is_empty() || !self.loose.is_empty() {
             return;
         }
-        let strays = self.strays();
+        let mut busy = self.attempted();
         for id in self.idle(turn, nodes) {
             while self.is_idle(turn, nodes, id) {
-                let free = |part: &PartId| self.may_audit(*part, id) && !strays.contains(&(*part, id));
+                let free = |part: &PartId| self.may_audit(*part, id) && !busy.contains(&(*part, id));
                 let Some(part) = self.audits.iter().copied().find(free) else { break };
                 self.audits.remove(&part);
+                busy.insert((part, id));
                 self.lease(turn, nodes, id, part, Role::Audit);
             }
         }
@@ -71,9 +72,9 @@ impl Job {
         !self.part(part).voted(id) && !self.part(part).failed_on(id)
     }
 
-    /// Attempts that do not count any more, and whose nodes need no second one at the same part.
-    fn strays(&self) -> BTreeSet<(PartId, NodeId)> {
-        self.leases.values().filter(|lease| lease.role == Role::Stray).map(|lease| (lease.part, lease.node)).collect()
+    /// Parts with the nodes that are at them, also in attempts that do not count any more: they need no second one there.
+    fn attempted(&self) -> BTreeSet<(PartId, NodeId)> {
+        self.leases.values().map(|lease| (lease.part, lease.node)).collect()
     }
 
     /// Whether a comparison is under way, or somebody is there for one.
@@ -81,10 +82,10 @@ impl Job {
         if self.audits.is_empty() && self.leases.is_empty() {
             return false;
         }
-        let strays = self.strays();
+        let busy = self.attempted();
         let open = self.leases.values().any(|lease| lease.role == Role::Audit);
         let possible =
-            |part: &PartId| nodes.keys().any(|id| self.usable(nodes, *id) && self.may_audit(*part, *id) && !strays.contains(&(*part, *id)));
+            |part: &PartId| nodes.keys().any(|id| self.usable(nodes, *id) && self.may_audit(*part, *id) && !busy.contains(&(*part, *id)));
         open || self.audits.iter().any(possible)
     }
 
@@ -116,6 +117,7 @@ impl Job {
             attempt.outcome = AttemptOutcome::Compared;
             attempt.reason = Some(if agreed { "the same pixels" } else { "other pixels than another node's" }.to_owned());
         }
+        self.audits.remove(&id);
         if agreed {
             return;
         }

@@ -274,10 +274,13 @@ pub enum Event {
         /// Nothing, or why not.
         result: Result<(), String>,
     },
-    /// The coordinator was started anew and has replayed its journal; parts whose pixels were found on disk are committed by now.
+    /// The coordinator was started anew and has replayed its journal.
     Restarted {
         /// What it computes with.
         build: Build,
+        /// Attempts of open jobs whose pixels were found on disk, and that the farm does not call committed. They come with the restart, and not before
+        /// it: names that the farm gives until it knows of that may be those of attempts that the crash made it forget.
+        stored: Vec<(JobId, LeaseId)>,
     },
     /// Nothing but time has passed: send it when [`super::Farm::next_deadline`] is reached.
     Tick,

@@ -42,6 +42,9 @@ impl Farm {
             if let Some(held) = node.held.iter().find(|held| !known(held)) {
                 return Err(format!("node {} holds lease {} of job {}, which is not its own", id.0, held.lease.0, held.job.0));
             }
+            if node.lanes() == 0 && !node.held.is_empty() {
+                return Err(format!("node {} holds attempts, and all its lanes hang", id.0));
+            }
         }
         Ok(())
     }

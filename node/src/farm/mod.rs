@@ -98,7 +98,7 @@ impl Farm {
             Event::NodeDraining { node, incarnation } => self.node_drains(node, incarnation),
             Event::NodeHeard { node, incarnation } => _ = self.node_heard(node, incarnation),
             Event::NodeLeft { node, incarnation, reason } => self.node_left(node, incarnation, &reason),
-            Event::Restarted { build } => self.restarted(build),
+            Event::Restarted { build, stored } => self.restarted(build, &stored),
             Event::Tick => self.watch_nodes(),
             Event::PolicyAnswered { id, answer } => self.policy_answered(id, answer),
             Event::Prepared { node, incarnation, job, result } => {

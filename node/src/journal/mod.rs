@@ -37,7 +37,7 @@ const EVENTS: TableDefinition<u64, (u64, &[u8])> = TableDefinition::new("events"
 const BEGINNING: TableDefinition<u32, &[u8]> = TableDefinition::new("beginning");
 
 /// Changes with every change of what an event or a snapshot holds.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// The journal of one coordinator, in a folder of its own.
 pub struct Journal {
@@ -58,8 +58,8 @@ pub struct Recovered {
 }
 
 impl Journal {
-    /// Opens the journal in a folder, or begins one, and replays it. After it, the coordinator steps through one [`Event::Committed`] for every part that
-    /// [`Self::stored`] names and the farm does not call committed, and then through [`Event::Restarted`].
+    /// Opens the journal in a folder, or begins one, and replays it. After it, the coordinator steps through [`Event::Restarted`], with every attempt that
+    /// [`Self::stored`] names and the farm does not call committed.
     ///
     /// # Errors
     /// When files cannot be read or written, or when another process holds the journal.

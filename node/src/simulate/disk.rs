@@ -76,10 +76,11 @@ impl World {
         self.filter = Filter::default();
         (self.epoch, self.disk.syncing) = (self.epoch + 1, false);
         self.ahead = self.farm.now().as_nanos() as i64 - self.now.as_nanos() as i64;
-        let before = self.settled.clone();
-        self.recover_pixels();
+        let before = std::mem::take(&mut self.settled);
+        let stored = self.recover_pixels();
+        self.settle_again(&stored);
+        self.step(Event::Restarted { build: canary(self.build), stored });
         self.check_settled(&before);
-        self.step(Event::Restarted { build: canary(self.build) });
         self.open.clear();
         self.synced(self.disk.journal.len());
         // Who was not answered asks again.
@@ -111,35 +112,39 @@ impl World {
         self.disk.journal.truncate(entries);
     }
 
-    /// Pixels that reached the disk when their commit did not; those on their way may have or not.
-    fn recover_pixels(&mut self) {
+    /// Attempts whose pixels reached the disk when their commit did not; those on their way may have or not.
+    fn recover_pixels(&mut self) -> Vec<(JobId, LeaseId)> {
         for ((job, lease), part) in std::mem::take(&mut self.disk.coming) {
             if self.random.happens(0.5) {
                 self.disk.pixels.insert((job, lease), part);
             }
         }
         let open: Vec<JobId> = self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id).collect();
-        let stored: Vec<_> = self.disk.pixels.iter().map(|((job, lease), part)| (*job, *lease, *part)).collect();
-        for (job, lease, part) in stored.into_iter().filter(|(job, ..)| open.contains(job)) {
-            if !self.farm.committed(job).iter().any(|(_, _, committed)| *committed == lease) {
-                // It may be the last one, and then the picture is made at once.
-                self.settled.entry((job, part)).or_insert(lease);
-                self.step(Event::Committed { job, lease });
+        let is_new = |job: JobId, lease: LeaseId| !self.farm.committed(job).iter().any(|(_, _, committed)| *committed == lease);
+        let stored = self.disk.pixels.keys().filter(|(job, _)| open.contains(job));
+        stored.filter(|(job, lease)| is_new(*job, *lease)).copied().collect()
+    }
+
+    /// What the farm is about to take for committed: what the journal tells, and what was found on disk.
+    fn settle_again(&mut self, stored: &[(JobId, LeaseId)]) {
+        let mut farm = self.farm.clone();
+        farm.step(self.clock(), Event::Restarted { build: canary(self.build), stored: stored.to_vec() });
+        for job in farm.jobs().into_iter().map(|job| job.id) {
+            for (part, _, lease) in farm.committed(job) {
+                // What a crash took may have revoked it.
+                self.revoked.remove(&lease);
+                self.settled.insert((job, part), lease);
             }
         }
     }
 
     /// No part that was committed is to be rendered again, and what is taken for committed is on disk.
     fn check_settled(&mut self, before: &BTreeMap<(JobId, PartId), LeaseId>) {
-        self.settled.clear();
         for job in self.farm.jobs().into_iter().filter(|job| job.outcome.is_none()).map(|job| job.id) {
             for (part, _, lease) in self.farm.committed(job) {
                 if !self.disk.pixels.contains_key(&(job, lease)) {
                     self.violation(format!("part {} of job {} is taken for committed, and is not on disk", part.0, job.0));
                 }
-                // What a crash took may have revoked it.
-                self.revoked.remove(&lease);
-                self.settled.insert((job, part), lease);
             }
             let lost = before.iter().find(|((of, part), lease)| *of == job && self.settled.get(&(job, *part)) != Some(lease));
             if let Some(((_, part), lease)) = lost {

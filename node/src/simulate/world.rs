@@ -78,7 +78,8 @@ impl World {
     /// A world in which nothing has happened yet.
     pub fn new(scenario: Scenario) -> Self {
         let mut farm = Farm::new(scenario.config.clone());
-        let begin = [Event::Restarted { build: canary(0) }, Event::JobSubmitted { job: JOB, spec: scenario.job.clone() }];
+        let begin =
+            [Event::Restarted { build: canary(0), stored: Vec::new() }, Event::JobSubmitted { job: JOB, spec: scenario.job.clone() }];
         begin.iter().for_each(|event| drop(farm.step(Duration::ZERO, event.clone())));
         let nodes: Vec<Node> = scenario.machines.iter().enumerate().map(|(i, machine)| Node::new(i, machine.clone())).collect();
         let powers = nodes.iter().map(|node| (node.id, node.machine.speed * f64::from(node.machine.lanes))).collect();

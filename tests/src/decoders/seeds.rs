@@ -292,7 +292,7 @@ fn events(further: &[Event]) -> Vec<u8> {
     let (node, incarnation, job) = (NODE, LIFE, JOB);
     let info = NodeInfo { name: "attic".into(), lanes: 2, build: "0.1.0".into(), address: "127.0.0.1:5".into() };
     let told = [
-        Event::Restarted { build: BUILD },
+        Event::Restarted { build: BUILD, stored: Vec::new() },
         Event::NodeJoined { node, incarnation, info },
         Event::NodeProved { node, incarnation, canary: BUILD.canary },
         Event::JobSubmitted { job, spec: journal::spec() },
@@ -315,7 +315,7 @@ fn troubles() -> Vec<Event> {
         Event::PolicyAnswered { id: PolicyId(1), answer: Ok(Answer::Split(vec![RECT])) },
         Event::NodeHeard { node, incarnation },
         Event::NodeLeft { node, incarnation, reason: "it is late".into() },
-        Event::Restarted { build: Build { revision: 2, canary: [7; 32] } },
+        Event::Restarted { build: Build { revision: 2, canary: [7; 32] }, stored: Vec::new() },
         Event::JobPaused { job, reason: "by ann".into(), operator: false },
         Event::JobResumed { job, reason: "by ann".into() },
         Event::JobRanked { job, priority: 7, operator: false },

@@ -24,7 +24,7 @@ impl Bench {
     /// Ready nodes of one lane, and a job of 16 equal parts that needs no probe.
     fn new(nodes: u32, assign: Assign) -> Self {
         let mut bench = Self { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
-        bench.does(Event::Restarted { build: BUILD });
+        bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
         bench.does(Event::JobSubmitted { job: JOB, spec: spec(assign, nodes) });
         (0..nodes).for_each(|node| bench.ready(node, 1));
         (0..nodes).for_each(|node| bench.prepared(node, 1));
@@ -224,7 +224,7 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
 #[test]
 fn a_prepared_node_that_dies_takes_its_deadline_with_it() {
     let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
-    bench.does(Event::Restarted { build: BUILD });
+    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
     bench.does(Event::JobSubmitted { job: JOB, spec: spec(Assign::Paper, 2) });
     (0..2).for_each(|node| bench.ready(node, 1));
     bench.prepared(0, 1);

@@ -5,7 +5,7 @@ use super::*;
 /// Ready nodes of one lane, and no job.
 fn bench(nodes: u32) -> Bench {
     let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
-    bench.does(Event::Restarted { build: BUILD });
+    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
     (0..nodes).for_each(|node| bench.ready(node, 1));
     bench
 }
@@ -203,7 +203,7 @@ fn each_job_stays_on_nodes_of_one_build() {
     const NEW: Build = Build { revision: 2, canary: [9; 32] };
     let mut bench = bench(2);
     bench.submit(1, |_| ());
-    bench.does(Event::Restarted { build: NEW });
+    bench.does(Event::Restarted { build: NEW, stored: Vec::new() });
     // Node 1 is upgraded too, and comes back.
     let info = NodeInfo { name: "n1".into(), lanes: 1, build: "new".into(), address: "a".into() };
     bench.does(Event::NodeJoined { node: NodeId(1), incarnation: Incarnation(2), info });
