@@ -379,6 +379,17 @@ pub const PROBE_PATCH_PER_AXIS: u32 = 4;
 /// Parts a node holds beyond those its lanes render, so that no lane waits for the network.
 pub const PREFETCH_PER_LANE: usize = 1;
 
+/// Further attempts of its own queue that a node may hold for each of its lanes where the way to it takes long.
+pub const DEEPEST_PREFETCH: usize = 7;
+
+/// Share of the time that lanes may spend waiting for parts before their node gets more in advance, and the least that is worth it for a part.
+pub const WAITING_SHARE: f64 = 0.02;
+/// See [`WAITING_SHARE`].
+pub const LEAST_WAITING: Duration = Duration::from_millis(1);
+
+/// The most that a lane is taken to have waited for one part: what takes longer is no network.
+pub const MOST_WAITING: Duration = Duration::from_secs(2);
+
 /// Between two looks at how nodes could help others, for each node: a bound of the share of its time that a coordinator spends with it.
 pub const HELP_PAUSE_PER_NODE: Duration = Duration::from_micros(20);
 

@@ -1,5 +1,7 @@
 //! Parts are delivered and committed. A part is committed once, whoever else renders it too.
 
+use std::time::Duration;
+
 use super::job::Job;
 use super::node::Nodes;
 use super::part::{Lease, PartState, Place, Role};
@@ -45,6 +47,10 @@ impl Job {
             return Err(self.why_unknown(lease));
         };
         let (part, now, is_audit) = (of.part, turn.now, self.part(of.part).is_delivered());
+        let free = of.begun.map_or(Duration::ZERO, |begun| now.saturating_sub(begun));
+        if let Some(known) = nodes.get_mut(&node).filter(|_| of.role != Role::Stray) {
+            known.depth.note(free, seconds, known.deep_capacity(&turn.config));
+        }
         self.release_lease(turn, nodes, lease);
         let state = self.part_mut(part);
         state.votes.push((node, hash));

@@ -10,6 +10,7 @@ mod auditing;
 mod command;
 mod config;
 mod delivering;
+mod depth;
 mod ending;
 mod event;
 mod failing;

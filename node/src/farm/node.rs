@@ -7,6 +7,7 @@ use std::{
 
 use serde::{Deserialize, Serialize};
 
+use super::depth::Depth;
 use super::{FarmConfig, Incarnation, JobId, LeaseId, NodeInfo};
 use crate::schedule::NodeId;
 
@@ -31,6 +32,8 @@ pub(super) struct Node {
     pub held: Vec<Held>,
     /// Attempts that took so long that their lanes are taken to hang.
     pub hanging: BTreeSet<(JobId, LeaseId)>,
+    /// What it gets in advance.
+    pub depth: Depth,
 }
 
 /// An attempt that a node holds.
@@ -75,6 +78,7 @@ impl Node {
             heard: now,
             held: Vec::new(),
             hanging: BTreeSet::new(),
+            depth: Depth::default(),
         }
     }
 
@@ -103,9 +107,14 @@ impl Node {
         self.lanes().saturating_sub(self.held.len())
     }
 
-    /// Attempts that it may hold: more than its lanes render, so that none waits for the network.
+    /// Attempts that it may hold of whatever it gets: more than its lanes render, so that none waits for the network.
     pub fn capacity(&self, config: &FarmConfig) -> usize {
         self.lanes() * (1 + config.prefetch_per_lane)
+    }
+
+    /// Attempts that it may hold of its own queue: what is handed out can hardly be given to another any more.
+    pub fn deep_capacity(&self, config: &FarmConfig) -> usize {
+        self.capacity(config) + self.lanes() * self.depth.extra
     }
 
     /// Whether it renders a part that it may die of: alone, so that no other part is blamed for it.

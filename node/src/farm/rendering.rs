@@ -23,7 +23,8 @@ impl Job {
         self.watch_progress(turn, nodes);
         self.redistribute(turn, nodes);
         if self.queued > 0 {
-            self.not_full(turn, nodes).into_iter().for_each(|id| self.fill(turn, nodes, id));
+            let roomy: Vec<NodeId> = turn.roomy.iter().copied().collect();
+            roomy.into_iter().for_each(|id| self.fill(turn, nodes, id));
         }
         self.help_others(turn, nodes);
         self.finish(turn, nodes);
@@ -71,7 +72,7 @@ impl Job {
 
     /// Hands a node as many parts of its own queue as it may hold.
     pub(super) fn fill(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
-        while self.has_room(turn, nodes, id) {
+        while self.has_depth(turn, nodes, id) {
             let Some(part) = self.members.get(&id).and_then(|member| member.queue.front().copied()) else { return };
             if self.part(part).suspect && !self.is_alone(nodes, id) {
                 return;
@@ -84,6 +85,12 @@ impl Job {
     /// Whether a node may get a part of this job now.
     pub(super) fn has_room(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
         let room = |node: &Node| node.held.len() < node.capacity(&turn.config) && !node.is_isolated();
+        self.may_hand_out(turn) && self.usable(nodes, id) && nodes.get(&id).is_some_and(room)
+    }
+
+    /// Whether a node may get a part of its own queue now.
+    fn has_depth(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
+        let room = |node: &Node| node.held.len() < node.deep_capacity(&turn.config) && !node.is_isolated();
         self.may_hand_out(turn) && self.usable(nodes, id) && nodes.get(&id).is_some_and(room)
     }
 
@@ -140,7 +147,7 @@ impl Job {
         let (rect, suspect, seconds) = (state.rect, state.suspect, state.expected);
         let seconds = self.usual_seconds().unwrap_or(seconds.clamp(LEAST_CHARGE, MOST_CHARGE));
         node.held.push(Held { job: self.id, lease, suspect });
-        if node.held.len() >= node.capacity(&turn.config) {
+        if node.held.len() >= node.deep_capacity(&turn.config) {
             turn.roomy.remove(&id);
         }
         turn.quota = turn.quota.saturating_sub(1);

@@ -168,7 +168,7 @@ fn pixels_on_disk_are_not_rendered_again_after_a_crash_before_their_commit() {
     // Lost: the pixels were in memory. Kept: the journal's segment has them, and the coordinator says so.
     let orders = |stored: Vec<(JobId, LeaseId)>| -> usize {
         let mut farm = farm.clone();
-        farm.step(Duration::from_secs(2), Event::Restarted { build: BUILD, stored, stored: Vec::new() });
+        farm.step(Duration::from_secs(2), Event::Restarted { build: BUILD, stored });
         let (node, incarnation) = (NodeId(0), Incarnation(8));
         let info = NodeInfo { name: "n".into(), lanes: 16, build: "b".into(), address: "a".into() };
         let mut commands = farm.step(Duration::from_secs(2), Event::NodeJoined { node, incarnation, info });
