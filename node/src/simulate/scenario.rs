@@ -85,6 +85,13 @@ pub enum Fault {
     Upgrade,
 }
 
+impl Fault {
+    /// Whether it is a user who asks the coordinator for something, at an unlucky moment.
+    pub fn is_of_user(&self) -> bool {
+        matches!(self, Self::Cancel(_) | Self::PauseJob(_) | Self::ResumeJob(_) | Self::Rank(..))
+    }
+}
+
 /// A place of the frame that no node can render.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poison {

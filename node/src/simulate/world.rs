@@ -41,6 +41,17 @@ pub(super) enum Happening {
     Fault(Fault),
 }
 
+impl Happening {
+    /// Whether the coordinator hears of it.
+    fn is_heard(&self) -> bool {
+        match self {
+            Self::Farm(..) | Self::FromNode(..) | Self::Stored(..) | Self::Synced(..) | Self::Submit(..) => true,
+            Self::Fault(fault) => fault.is_of_user(),
+            _ => false,
+        }
+    }
+}
+
 /// A simulation while it runs.
 pub struct World {
     pub(super) scenario: Scenario,
@@ -183,7 +194,7 @@ impl World {
         if let Some(later) = self.held_up(&happening) {
             return self.plan(later, happening);
         }
-        if !matches!(happening, Happening::Fault(_)) {
+        if happening.is_heard() {
             self.wake();
         }
         match happening {
@@ -231,7 +242,7 @@ impl World {
                 (true, self.stalled.max(self.disk.full))
             }
             Happening::Farm(..) | Happening::Submit(..) => (true, self.stalled),
-            Happening::Fault(_) => return None,
+            Happening::Fault(fault) => (fault.is_of_user(), self.stalled),
         };
         (node && until > self.now).then_some(until)
     }
