@@ -188,10 +188,15 @@ impl World {
     }
 
     fn next(&mut self) {
-        let Some(Reverse((at, _, index))) = self.agenda.pop() else { return };
+        let Some(Reverse((at, number, index))) = self.agenda.pop() else { return };
         self.now = self.now.max(at);
         let Some(happening) = self.happenings[index].take() else { return };
         if let Some(later) = self.held_up(&happening) {
+            // A user's requests come in the order in which they were made.
+            if matches!(happening, Happening::Fault(_)) {
+                self.happenings[index] = Some(happening);
+                return self.agenda.push(Reverse((later, number, index)));
+            }
             return self.plan(later, happening);
         }
         if happening.is_heard() {
