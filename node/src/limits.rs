@@ -382,9 +382,10 @@ pub const PREFETCH_PER_LANE: usize = 1;
 /// Further attempts of its own queue that a node may hold for each of its lanes where the way to it takes long.
 pub const DEEPEST_PREFETCH: usize = 7;
 
-/// Share of the time that lanes may spend waiting for parts before their node gets more in advance, and the least that is worth it for a part.
+/// Share of the time for which lanes may wait for parts before their node gets more in advance.
 pub const WAITING_SHARE: f64 = 0.02;
-/// See [`WAITING_SHARE`].
+
+/// The least wait for a part, on the average, that is worth it.
 pub const LEAST_WAITING: Duration = Duration::from_millis(1);
 
 /// The most that a lane is taken to have waited for one part: what takes longer is no network.

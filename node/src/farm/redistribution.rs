@@ -1,5 +1,7 @@
 //! Parts lose their node and get another.
 
+use std::collections::BTreeSet;
+
 use super::job::{Job, Phase, Stage};
 use super::node::{Held, Nodes};
 use super::part::{Lease, Place, Role};
@@ -68,9 +70,11 @@ impl Job {
         self.strip(turn, nodes, id, "its node was lost");
         let void: Vec<(LeaseId, Lease)> =
             self.leases.iter().filter(|(_, lease)| lease.node == id).map(|(lease, of)| (*lease, of.clone())).collect();
+        let mut blamed = BTreeSet::new();
         for (lease, of) in &void {
             self.close(turn, nodes, *lease, AttemptOutcome::Lost, reason);
-            if crashed && of.begun.is_some() && of.role != Role::Audit {
+            // A node dies once, however many attempts at a part it had.
+            if crashed && of.begun.is_some() && of.role != Role::Audit && blamed.insert(of.part) {
                 self.part_mut(of.part).failures.push((id, format!("it was lost meanwhile: {reason}")));
             }
         }

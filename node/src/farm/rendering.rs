@@ -6,7 +6,7 @@ use super::job::{Job, Phase};
 use super::node::{Held, Node, Nodes};
 use super::part::{Lease, Place, Role};
 use super::turn::Turn;
-use super::{Command, Outcome, ToNode};
+use super::{Command, FarmConfig, Outcome, ToNode};
 use crate::limits::{HELP_PAUSE_PER_NODE, OVERDUE_AFTER, OVERDUE_FACTOR};
 use crate::manifest::EventKind;
 use crate::schedule::{Assign, NodeId, PartId};
@@ -84,13 +84,16 @@ impl Job {
 
     /// Whether a node may get a part of this job now.
     pub(super) fn has_room(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
-        let room = |node: &Node| node.held.len() < node.capacity(&turn.config) && !node.is_isolated();
-        self.may_hand_out(turn) && self.usable(nodes, id) && nodes.get(&id).is_some_and(room)
+        self.holds_less(turn, nodes, id, Node::capacity)
     }
 
     /// Whether a node may get a part of its own queue now.
     fn has_depth(&self, turn: &Turn, nodes: &Nodes, id: NodeId) -> bool {
-        let room = |node: &Node| node.held.len() < node.deep_capacity(&turn.config) && !node.is_isolated();
+        self.holds_less(turn, nodes, id, Node::deep_capacity)
+    }
+
+    fn holds_less(&self, turn: &Turn, nodes: &Nodes, id: NodeId, capacity: fn(&Node, &FarmConfig) -> usize) -> bool {
+        let room = |node: &Node| node.held.len() < capacity(node, &turn.config) && !node.is_isolated();
         self.may_hand_out(turn) && self.usable(nodes, id) && nodes.get(&id).is_some_and(room)
     }
 
