@@ -82,7 +82,8 @@ impl Journal {
         let database = Database::open(&path).map_err(|error| match error {
             redb::DatabaseError::DatabaseAlreadyOpen => failed(&path, "open the journal", "another coordinator uses it")
                 .with_help("end that one, or choose another folder with --data"),
-            error => failed(&path, "open the journal", &error),
+            error => failed(&path, "open the journal", &error)
+                .with_help("if the file is damaged, move it away: jobs that were running have to be submitted again"),
         })?;
         let read = replay(&database, config).map_err(|error| failed(&path, "read the journal", &*error))?;
         let Some((farm, events)) = read else {

@@ -85,6 +85,18 @@ fn two_coordinators_cannot_share_a_journal() {
     assert!(error.message.contains("cannot open the journal"), "{error}");
 }
 
+#[test]
+fn a_file_that_is_no_journal_is_refused_with_a_way_out_and_stays_as_it_is() {
+    for bytes in [&b""[..], b"redb", &[7; 10_000]] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("events.redb");
+        std::fs::write(&path, bytes).unwrap();
+        let error = Journal::open(folder.path(), FarmConfig::default()).err().unwrap().to_string();
+        assert!(error.contains("events.redb") && error.contains("move it away"), "{error}");
+        assert_eq!(std::fs::read(&path).unwrap(), bytes);
+    }
+}
+
 /// A job's pixels with three parts; where the last one begins, and the whole file.
 fn pixels(folder: &Path) -> (usize, Vec<u8>) {
     let path = folder.join("job-1.pixels");
