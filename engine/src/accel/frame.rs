@@ -12,10 +12,15 @@ use crate::{math::max_abs, shape::Bounds};
 pub struct Normalisation {
     center: DVec3,
     scale: f64,
+    /// 1 / scale.
+    unscale: f64,
 }
 
 /// Bound on the relative error, in f64, of moving a ray's start.
 const START_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+
+/// Smallest unit of error that filters allow for.
+pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
 
 /// A ray in normalised coordinates, ready for conservative tests against f32 boxes.
 ///
@@ -35,8 +40,10 @@ pub struct BoxRay {
     pub(super) inverse_far: [f32; 4],
     /// Where the direction is negative: the near bound is the upper one.
     pub(super) negative: [bool; 3],
-    /// 1 + |origin|, and 2^18 times the error of a ray that started anew: filters allow for errors of 2^-18 of this.
-    pub(super) magnitude: f32,
+    /// |origin|.
+    size: f32,
+    /// Bound on what a ray that started anew is wrong by.
+    error: f32,
     ratio: f64,
     start: f64,
 }
@@ -46,7 +53,17 @@ impl Normalisation {
     pub fn of(bounds: Bounds) -> Self {
         let center = bounds.min + (bounds.max - bounds.min) * 0.5;
         let half = max_abs(bounds.max - center).max(max_abs(bounds.min - center));
-        Self { center, scale: if half > f64::MIN_POSITIVE * 4.0 { power_of_two_below(1.0 / half) } else { 1.0 } }
+        Self::new(center, half)
+    }
+
+    fn new(center: DVec3, half: f64) -> Self {
+        let scale = if half > f64::MIN_POSITIVE * 4.0 { power_of_two_below(1.0 / half) } else { 1.0 };
+        Self { center, scale, unscale: 1.0 / scale }
+    }
+
+    /// For things in a finite box that keep their origin: f32 coordinates stay as exact as they are.
+    pub fn scaling(bounds: Bounds) -> Self {
+        Self::new(DVec3::ZERO, max_abs(bounds.max).max(max_abs(bounds.min)))
     }
 
     /// A point in normalised coordinates.
@@ -56,8 +73,15 @@ impl Normalisation {
     }
 
     /// A length in normalised coordinates.
+    #[inline(always)]
     pub fn length(&self, length: f64) -> f64 {
         length * self.scale
+    }
+
+    /// The length that is this one in normalised coordinates.
+    #[inline(always)]
+    pub fn unscaled<T: std::ops::Mul<f64, Output = T>>(&self, length: T) -> T {
+        length * self.unscale
     }
 
     /// A ray in normalised coordinates. `direction` has any length but 0.
@@ -70,7 +94,7 @@ impl Normalisation {
         const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
         const SHRUNK: f32 = 1.0 - 1.0 / (1 << 21) as f32;
         const GROWN: f32 = 1.0 + 1.0 / (1 << 21) as f32;
-        let unit = if UNIT_LENGTH { 1.0 } else { power_of_two_below(1.0 / max_abs(direction)) };
+        let unit = if UNIT_LENGTH { 1.0 } else { inverse_power_of_two(max_abs(direction)) };
         let mut p = self.point(origin);
         let d = direction * unit;
         let mut start = 0.0;
@@ -83,7 +107,8 @@ impl Normalisation {
         let origin = [p.x, p.y, p.z, 0.0].map(|x| x as f32);
         let direction = [d.x, d.y, d.z, 1.0].map(|x| x as f32);
         let size = origin[0].abs().max(origin[1].abs()).max(origin[2].abs());
-        let shift = size.max(1.0) * (1.0 / (1 << 22) as f32) + (start * START_ERROR) as f32;
+        let error = (start * START_ERROR) as f32;
+        let shift = size.max(1.0) * (1.0 / (1 << 22) as f32) + error;
         let outward = direction.map(|x| shift.copysign(x));
         let inverse = direction.map(|x| 1.0 / x.abs().max(SMALLEST).copysign(x));
         BoxRay {
@@ -94,7 +119,8 @@ impl Normalisation {
             inverse_near: inverse.map(|x| x * SHRUNK),
             inverse_far: inverse.map(|x| x * GROWN),
             negative: from_fn(|i| direction[i].is_sign_negative()),
-            magnitude: 1.0 + size + (start * START_ERROR) as f32 * (1 << 18) as f32,
+            size,
+            error,
             ratio: self.scale / unit,
             start,
         }
@@ -107,7 +133,13 @@ impl BoxRay {
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
         let ([x, y, z, _], [dx, dy, dz, _]) = (self.origin, self.direction);
-        (((x + y) + (z + self.magnitude)) + (dx + dy + dz)).is_finite()
+        (((x + y) + (z + self.magnitude(FINEST))) + (dx + dy + dz)).is_finite()
+    }
+
+    /// 1 + |origin|, and as much as covers the ray's own error for a filter that allows for errors of this times `unit`.
+    #[inline(always)]
+    pub fn magnitude(&self, unit: f32) -> f32 {
+        1.0 + self.size + self.error * (1.0 / unit)
     }
 
     /// A parameter of the original ray as a limit for boxes, rounded up.
@@ -115,6 +147,12 @@ impl BoxRay {
     pub fn limit(&self, t: f64) -> f32 {
         (t * self.ratio - self.start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + (self.start * START_ERROR) as f32
     }
+}
+
+/// A power of two that takes a positive number to between 1 and 2, or as near as powers of two go.
+#[inline(always)]
+fn inverse_power_of_two(x: f64) -> f64 {
+    f64::from_bits((0x7fe0_0000_0000_0000_u64).saturating_sub(x.to_bits() & 0x7ff0_0000_0000_0000).max(1 << 52))
 }
 
 /// The largest power of two that is not above a positive normal number.

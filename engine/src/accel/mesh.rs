@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
 
-use super::{collapse::LeafRule, pack::Pack, simd::Lanes, tree::Tree};
+use super::{build::Box3, collapse::LeafRule, frame::Normalisation, pack::{Pack, PackRay}, simd::Lanes, tree::Tree};
 use crate::shape::{
     Bounds, Ray,
     triangle::{Sheared, TriangleHit},
@@ -15,8 +15,6 @@ use crate::shape::{
 pub struct MeshTree {
     tree: Tree,
     packs: Vec<Pack>,
-    /// Triangle of each place of each pack.
-    ids: Vec<[u32; 8]>,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     bounds: Bounds,
@@ -33,18 +31,22 @@ pub struct MeshHit {
 
 impl MeshTree {
     /// Builds the tree of at least one triangle; positions are finite and indices in range.
-    pub fn build(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
-        let vertices = |triangle: u32| triangles[triangle as usize].map(|i| Vec3::from(positions[i as usize]).as_dvec3());
-        let boxes: Vec<Bounds> = (0..triangles.len() as u32).map(|triangle| Bounds::of(vertices(triangle))).collect();
-        let bounds = boxes.iter().fold(Bounds::EMPTY, |sum, b| sum.union(*b));
-        let (mut packs, mut ids) = (Vec::new(), Vec::new());
+    pub fn build(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        let corners = triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3());
+        let frame = Normalisation::scaling(Bounds::of(corners));
+        // What scaling cannot keep, being 2^-126 of the mesh's size, is nothing for all who look at a position.
+        let scaled: Vec<Vec3> = positions.iter().map(|&p| frame.point(Vec3::from(p).as_dvec3()).as_vec3()).collect();
+        positions.iter_mut().zip(&scaled).for_each(|(p, scaled)| *p = frame.unscaled(scaled.as_dvec3()).as_vec3().into());
+        let vertices = |triangle: u32| triangles[triangle as usize].map(|i| scaled[i as usize]);
+        let boxes: Vec<Box3> = (0..triangles.len() as u32).map(|triangle| Box3::of(vertices(triangle))).collect();
+        let mut packs = Vec::new();
         // A pack costs less than a node, measured.
-        let tree = Tree::build(&boxes, LeafRule { most: 8, cost: 0.7 }, |frame, leaf| {
-            packs.push(Pack::new(leaf.iter().map(|&triangle| vertices(triangle).map(|p| frame.point(p)))));
-            ids.push(std::array::from_fn(|slot| leaf.get(slot).copied().unwrap_or(u32::MAX)));
+        let tree = Tree::over(frame, &boxes, LeafRule { most: 8, cost: 0.7 }, |leaf| {
+            packs.push(Pack::new(leaf.iter().map(|&triangle| (triangle, vertices(triangle)))));
             packs.len() as u32 - 1
         });
-        Self { tree, packs, ids, positions, triangles, bounds }
+        let bounds = Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
+        Self { tree, packs, positions, triangles, bounds }
     }
 
     /// Number of triangles.
@@ -72,7 +74,6 @@ impl MeshTree {
     pub fn bytes(&self) -> usize {
         self.tree.bytes()
             + size_of_val(&*self.packs)
-            + size_of_val(&*self.ids)
             + size_of_val(&*self.positions)
             + size_of_val(&*self.triangles)
     }
@@ -88,18 +89,26 @@ impl MeshTree {
         ray: &Ray,
         mut visit: impl FnMut(MeshHit) -> ControlFlow<(), f64>,
     ) -> ControlFlow<()> {
+        let frame = self.tree.frame();
         let boxed = self.tree.ray::<false>(ray.origin, ray.direction);
-        let sheared = Sheared::new(ray.origin, ray.direction);
+        let sheared = Sheared::new(frame.point(ray.origin), ray.direction);
+        let filter = PackRay::new(&boxed, &sheared);
         let mut limit = ray.t_max;
         let mut flow = ControlFlow::Continue(());
         let leaf = |pack: u32| {
-            // SAFETY: the tree's leaves are indices of packs; the caller has the instructions of `L`.
-            let mut candidates = unsafe { self.packs.get_unchecked(pack as usize).candidates::<L>(&boxed) };
+            // SAFETY: the tree's leaves are indices of packs.
+            let pack = unsafe { self.packs.get_unchecked(pack as usize) };
+            // SAFETY: the caller has the instructions of `L`.
+            let mut candidates = unsafe { pack.candidates::<L>(&filter) };
             while candidates != 0 {
-                let triangle = self.ids[pack as usize][candidates.trailing_zeros() as usize];
+                let slot = candidates.trailing_zeros() as usize;
                 candidates &= candidates - 1;
-                let Some(at) = sheared.hit(self.vertices(triangle)).filter(|at| at.t <= limit) else { continue };
-                match visit(MeshHit { triangle, at }) {
+                let Some(at) = sheared.hit(pack.triangle(slot)) else { continue };
+                let at = TriangleHit { t: frame.unscaled(at.t), ..at };
+                if at.t > limit {
+                    continue;
+                }
+                match visit(MeshHit { triangle: pack.id(slot), at }) {
                     ControlFlow::Continue(lower) => limit = lower,
                     ControlFlow::Break(()) => {
                         flow = ControlFlow::Break(());

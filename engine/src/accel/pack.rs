@@ -1,83 +1,117 @@
-//! Eight triangles at a time: the conservative f32 filter before the exact test.
+//! Eight triangles at a time: the conservative f32 filter before the exact test, and what that test reads.
 
 use glam::{DVec3, Vec3};
 
-use super::{frame::BoxRay, simd::Lanes};
+use super::{frame::{BoxRay, FINEST}, simd::Lanes};
+use crate::{math::max_abs, shape::triangle::Sheared};
 
-/// Eight triangles in normalised coordinates, structure of arrays.
-#[repr(C, align(64))]
+/// A ray as the filter sees it.
 #[derive(Clone, Copy, Debug)]
-pub struct Pack {
-    /// First vertex.
-    corner: [[f32; 8]; 3],
-    /// Second to first vertex.
-    edge1: [[f32; 8]; 3],
-    /// First to third vertex.
-    edge2: [[f32; 8]; 3],
-    /// Largest component of the edges, to which rounding errors are proportional; negative in empty places, which then never pass.
-    extent: [f32; 8],
+pub struct PackRay {
+    /// Axes in the order of the shear.
+    axes: [usize; 3],
+    /// In that order.
+    origin: [f32; 3],
+    shear: [f32; 2],
+    /// Slack is `(extent + near) * slack`.
+    near: f32,
+    slack: f32,
 }
 
-/// Extents below this count as this, so that underflow never exceeds the slack.
-const SMALLEST: f32 = 1e-30;
-
-impl Pack {
-    /// Up to eight triangles, each three vertices in normalised coordinates.
-    pub fn new(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Self {
-        let mut pack = Self { corner: [[0.0; 8]; 3], edge1: [[0.0; 8]; 3], edge2: [[0.0; 8]; 3], extent: [-1.0; 8] };
-        for (slot, [a, b, c]) in triangles.into_iter().take(8).enumerate() {
-            let (corner, edge1, edge2) = (a.as_vec3(), (a - b).as_vec3(), (c - a).as_vec3());
-            for axis in 0..3 {
-                pack.corner[axis][slot] = corner[axis];
-                pack.edge1[axis][slot] = edge1[axis];
-                pack.edge2[axis][slot] = edge2[axis];
-            }
-            pack.extent[slot] = max_abs(edge1).max(max_abs(edge2)).max(SMALLEST);
+impl PackRay {
+    /// The same ray twice.
+    #[inline(always)]
+    pub fn new(ray: &BoxRay, sheared: &Sheared) -> Self {
+        let magnitude = ray.magnitude(FINEST);
+        let axes = sheared.axes();
+        Self {
+            axes,
+            origin: axes.map(|axis| ray.origin[axis]),
+            shear: sheared.shear().map(|x| x as f32),
+            near: magnitude * (1.0 / (1 << 22) as f32),
+            slack: magnitude * (1.0 / (1 << 17) as f32),
         }
-        pack
     }
 
-    /// Bit i is set where the line of the ray may meet triangle i.
-    ///
-    /// The test is Möller and Trumbore's. With u = 2^-24, E the extent and M = 1 + |origin|: vertex minus origin is wrong by up to 3 u M, its
-    /// cross product with the direction by 12 u M, and a scalar product of that with an edge by 60 u M E; the determinant, of size up to
-    /// 12 E^2 <= 24 M E, by 80 u M E. The slacks below are 64 u M E for each of the two and 256 u M E for their sum.
+    /// Eight points, given by axis, as they lie beside the ray.
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub unsafe fn candidates<L: Lanes>(&self, ray: &BoxRay) -> u32 {
-        // SAFETY: by this function's own condition.
+    unsafe fn project<L: Lanes>(&self, points: &[[f32; 8]; 3]) -> (L, L) {
+        let [x, y, z] = self.axes;
+        // SAFETY: by this function's own condition; axes are below 3.
         unsafe {
-            let load = |v: &[[f32; 8]; 3]| [L::load(&v[0]), L::load(&v[1]), L::load(&v[2])];
-            let splat = |v: &[f32; 4]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
-            let (origin, direction) = (splat(&ray.origin), splat(&ray.direction));
-            let (corner, edge1, edge2) = (load(&self.corner), load(&self.edge1), load(&self.edge2));
-            let relative = [corner[0].sub(origin[0]), corner[1].sub(origin[1]), corner[2].sub(origin[2])];
-            let normal = cross(edge2, edge1);
-            let moment = cross(relative, direction);
-            let signed = dot(normal, direction);
-            let (u, v) = (dot(moment, edge2).with_sign_of(signed), dot(moment, edge1).with_sign_of(signed));
-            let slack = L::load(&self.extent).mul(L::splat(ray.magnitude * (1.0 / (1 << 18) as f32)));
-            let inside = u.min(v).add(slack);
-            let beyond = signed.abs().sub(u.add(v)).add(slack.mul(L::splat(4.0)));
-            L::splat(0.0).le(inside.min(beyond))
+            let z = L::load(points.get_unchecked(z)).sub(L::splat(self.origin[2]));
+            let x = L::load(points.get_unchecked(x)).sub(L::splat(self.origin[0])).sub(z.mul(L::splat(self.shear[0])));
+            let y = L::load(points.get_unchecked(y)).sub(L::splat(self.origin[1])).sub(z.mul(L::splat(self.shear[1])));
+            (x, y)
         }
     }
 }
 
-fn max_abs(v: Vec3) -> f32 {
-    v.abs().max_element()
+/// Eight triangles in scaled coordinates, structure of arrays.
+#[repr(C, align(32))]
+#[derive(Clone, Copy, Debug)]
+pub struct Pack {
+    /// By vertex and axis.
+    vertices: [[[f32; 8]; 3]; 3],
+    /// Largest component of the edges, to which rounding errors are proportional; below all numbers in empty places, which then never pass.
+    extent: [f32; 8],
+    /// Number of each triangle in its mesh.
+    ids: [u32; 8],
 }
 
-#[inline(always)]
-unsafe fn cross<L: Lanes>(a: [L; 3], b: [L; 3]) -> [L; 3] {
-    // SAFETY: the caller has the instructions of `L`.
-    unsafe { [a[1].mul(b[2]).sub(a[2].mul(b[1])), a[2].mul(b[0]).sub(a[0].mul(b[2])), a[0].mul(b[1]).sub(a[1].mul(b[0]))] }
-}
+impl Pack {
+    /// Up to eight triangles, each three vertices in scaled coordinates, with their numbers.
+    pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
+        let mut pack = Self { vertices: [[[0.0; 8]; 3]; 3], extent: [f32::NEG_INFINITY; 8], ids: [u32::MAX; 8] };
+        for (slot, (id, vertices)) in triangles.into_iter().take(8).enumerate() {
+            for (vertex, axis) in (0..3).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
+                pack.vertices[vertex][axis][slot] = vertices[vertex][axis];
+            }
+            let [a, b, c] = vertices.map(Vec3::as_dvec3);
+            pack.extent[slot] = (max_abs(a - b).max(max_abs(b - c)).max(max_abs(c - a)) as f32).next_up();
+            pack.ids[slot] = id;
+        }
+        pack
+    }
 
-#[inline(always)]
-unsafe fn dot<L: Lanes>(a: [L; 3], b: [L; 3]) -> L {
-    // SAFETY: the caller has the instructions of `L`.
-    unsafe { a[0].mul(b[0]).add(a[1].mul(b[1])).add(a[2].mul(b[2])) }
+    /// Number of the triangle in a place.
+    #[inline(always)]
+    pub fn id(&self, slot: usize) -> u32 {
+        self.ids[slot]
+    }
+
+    /// The triangle in a place.
+    #[inline(always)]
+    pub fn triangle(&self, slot: usize) -> [DVec3; 3] {
+        self.vertices.each_ref().map(|[x, y, z]| DVec3::new(x[slot].into(), y[slot].into(), z[slot].into()))
+    }
+
+    /// Bit i is set where the line of the ray may meet triangle i.
+    ///
+    /// The test is that of `shape::triangle` in f32: vertices are sheared so that the ray becomes the z axis, and the signs of the edge functions
+    /// decide. With u = 2^-24, E the extent and M = 1 + |origin| (coordinates are at most 1): vertex minus origin is wrong by up to 2 u M,
+    /// as the origin is rounded too, and a sheared coordinate by d = 8 u M. Where the line meets the triangle, sheared coordinates are at most 2 E, since
+    /// they surround 0, so that an edge function is wrong by up to 8 E d + 2 d^2 for its arguments and 4 u (2 E + d)^2 for its own rounding:
+    /// with E <= 2 M less than 128 u M (E + 4 u M), the slack.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub unsafe fn candidates<L: Lanes>(&self, ray: &PackRay) -> u32 {
+        // SAFETY: by this function's own condition; axes are below 3.
+        unsafe {
+            let [a, b, c] = &self.vertices;
+            let (a, b, c) = (ray.project::<L>(a), ray.project::<L>(b), ray.project::<L>(c));
+            let u = c.0.mul(b.1).sub(c.1.mul(b.0));
+            let v = a.0.mul(c.1).sub(a.1.mul(c.0));
+            let w = b.0.mul(a.1).sub(b.1.mul(a.0));
+            let (lowest, highest) = (u.min(v).min(w), u.max(v).max(w));
+            let slack = L::load(&self.extent).add(L::splat(ray.near)).mul(L::splat(ray.slack));
+            let zero = L::splat(0.0);
+            zero.le(lowest.max(zero.sub(highest)).add(slack))
+        }
+    }
 }

@@ -34,8 +34,6 @@ pub(crate) trait Lanes: Copy {
     unsafe fn min(self, o: Self) -> Self;
     unsafe fn max(self, o: Self) -> Self;
     unsafe fn abs(self) -> Self;
-    /// The sign bits of `o` are flipped into `self` where `o` is negative.
-    unsafe fn with_sign_of(self, o: Self) -> Self;
     /// Bit i is set where `self[i] <= o[i]`.
     unsafe fn le(self, o: Self) -> u32;
 }
@@ -62,7 +60,6 @@ mod x86 {
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { unsafe { Self(_mm256_min_ps(self.0, o.0)) } }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { unsafe { Self(_mm256_max_ps(self.0, o.0)) } }
         #[inline(always)] unsafe fn abs(self) -> Self { unsafe { Self(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) } }
-        #[inline(always)] unsafe fn with_sign_of(self, o: Self) -> Self { unsafe { Self(_mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), o.0))) } }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, o.0)) as u32 } }
     }
 
@@ -81,7 +78,6 @@ mod x86 {
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { unsafe { Self(_mm_min_ps(self.0, o.0), _mm_min_ps(self.1, o.1)) } }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { unsafe { Self(_mm_max_ps(self.0, o.0), _mm_max_ps(self.1, o.1)) } }
         #[inline(always)] unsafe fn abs(self) -> Self { unsafe { let s = _mm_set1_ps(-0.0); Self(_mm_andnot_ps(s, self.0), _mm_andnot_ps(s, self.1)) } }
-        #[inline(always)] unsafe fn with_sign_of(self, o: Self) -> Self { unsafe { let s = _mm_set1_ps(-0.0); Self(_mm_xor_ps(self.0, _mm_and_ps(s, o.0)), _mm_xor_ps(self.1, _mm_and_ps(s, o.1))) } }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { unsafe { (_mm_movemask_ps(_mm_cmple_ps(self.0, o.0)) | _mm_movemask_ps(_mm_cmple_ps(self.1, o.1)) << 4) as u32 } }
     }
 }
@@ -115,7 +111,6 @@ mod portable {
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { self.zip(o, |a, b| if a < b { a } else { b }) }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { self.zip(o, |a, b| if a > b { a } else { b }) }
         #[inline(always)] unsafe fn abs(self) -> Self { Self(self.0.map(f32::abs)) }
-        #[inline(always)] unsafe fn with_sign_of(self, o: Self) -> Self { self.zip(o, |a, b| f32::from_bits(a.to_bits() ^ b.to_bits() & 0x8000_0000)) }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] <= o.0[i]) << i) }
     }
 }

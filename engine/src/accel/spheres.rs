@@ -104,6 +104,7 @@ impl Pack {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     unsafe fn candidates<L: Lanes>(&self, ray: &BoxRay, limit: f32) -> u32 {
+        const UNIT: f32 = 1.0 / (1 << 18) as f32;
         // SAFETY: by this function's own condition.
         unsafe {
             let [dx, dy, dz] = [L::splat(ray.direction[0]), L::splat(ray.direction[1]), L::splat(ray.direction[2])];
@@ -113,7 +114,7 @@ impl Pack {
             let along = x.mul(dx).add(y.mul(dy)).add(z.mul(dz));
             let (x, y, z) = (x.sub(dx.mul(along)), y.sub(dy.mul(along)), z.sub(dz.mul(along)));
             let squared = x.mul(x).add(y.mul(y)).add(z.mul(z));
-            let reach = L::load(&self.radius).add(L::splat(ray.magnitude * (1.0 / (1 << 18) as f32)));
+            let reach = L::load(&self.radius).add(L::splat(ray.magnitude(UNIT) * UNIT));
             let ahead = along.add(reach);
             let before = L::splat(limit).add(reach).sub(along);
             squared.le(reach.mul(reach)) & L::splat(0.0).le(ahead.min(before))

@@ -123,7 +123,7 @@ impl Geometry {
         let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
         self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
         self.tree =
-            (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |_, leaf| references[leaf[0] as usize]));
+            (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
     }
 }
 

@@ -12,6 +12,7 @@ mod tracer;
 mod tests;
 
 pub use error::{CompileError, Warning};
+pub use query::Hit;
 pub use statistics::Statistics;
 pub use surface::{Crossing, Surface};
 pub use tracer::{Tracer, Work};

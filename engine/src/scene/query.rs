@@ -17,23 +17,32 @@ use crate::{
     shape::{Point, Ray, Sphere, triangle::TriangleHit},
 };
 
-/// The nearest hit so far.
-#[derive(Clone, Copy)]
-pub(super) struct Hit {
-    t: f64,
-    object: u32,
-    /// Triangle of a mesh, face of a box.
-    part: u32,
+/// Where a ray meets something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Parameter of the ray: the distance, as its direction is a unit vector.
+    pub t: f64,
+    /// Place of the object in the order of the scene.
+    pub object: u32,
+    /// Triangle of a mesh, face of a box; 0 on everything else.
+    pub part: u32,
     /// Kind and index of the shape.
     reference: u32,
-    /// Barycentric coordinates on a triangle.
-    b1: f64,
-    b2: f64,
+    /// Barycentric coordinates on a triangle: the weight of its second vertex.
+    pub b1: f64,
+    /// The weight of its third vertex.
+    pub b2: f64,
 }
 
 const NONE: u32 = u32::MAX;
 
 impl Hit {
+    /// `None` for the hit of nothing.
+    #[inline(always)]
+    pub(super) fn some(self) -> Option<Self> {
+        (self.reference != NONE).then_some(self)
+    }
+
     /// Takes over a hit that is nearer, or as near and of an earlier object.
     #[inline(always)]
     fn offer(&mut self, hit: Hit) {

@@ -9,10 +9,13 @@ use crate::{
     shape::Ray,
 };
 
-use super::{Crossing, Scene, Surface};
+use super::{Crossing, Hit, Scene, Surface};
 
 /// A scene and its queries, in code for one kind of processor: what [`Scene::run`] gives to its work. All kinds give the same bits.
 pub trait Tracer: Copy + Deref<Target = Scene> {
+    /// The nearest hit of a ray of unit direction.
+    fn hit(self, ray: &Ray) -> Option<Hit>;
+
     /// See [`Scene::closest`].
     fn closest(self, ray: &Ray) -> Option<Surface>;
 
@@ -92,6 +95,12 @@ impl<L> Deref for View<'_, L> {
 #[cfg(target_arch = "x86_64")]
 impl Tracer for View<'_, Avx2> {
     #[inline(always)]
+    fn hit(self, ray: &Ray) -> Option<Hit> {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.closest_avx2(ray) }.some()
+    }
+
+    #[inline(always)]
     fn closest(self, ray: &Ray) -> Option<Surface> {
         // SAFETY: `self` is the proof.
         let hit = unsafe { self.scene.closest_avx2(ray) };
@@ -119,6 +128,12 @@ impl Tracer for View<'_, Avx2> {
 }
 
 impl Tracer for View<'_, Baseline> {
+    #[inline(always)]
+    fn hit(self, ray: &Ray) -> Option<Hit> {
+        // SAFETY: `self` is the proof.
+        unsafe { self.scene.closest_in::<Baseline>(ray, None) }.some()
+    }
+
     #[inline(always)]
     fn closest(self, ray: &Ray) -> Option<Surface> {
         // SAFETY: `self` is the proof.

@@ -47,6 +47,18 @@ impl Sheared {
         Self { origin, direction, axes: [x, y, z], shear: DVec3::new(direction[x] * scale, direction[y] * scale, scale) }
     }
 
+    /// Axes: that of the direction's largest component is the last.
+    #[inline(always)]
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
+    }
+
+    /// How far the first and the second axis lean along the last.
+    #[inline(always)]
+    pub fn shear(&self) -> [f64; 2] {
+        [self.shear.x, self.shear.y]
+    }
+
     /// The hit with `t > 0`, of either side.
     #[inline(always)]
     pub fn hit(&self, vertices: [DVec3; 3]) -> Option<TriangleHit> {
