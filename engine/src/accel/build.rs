@@ -32,6 +32,11 @@ impl Box3 {
         Self { min: self.min.min(o.min), max: self.max.max(o.max) }
     }
 
+    /// What lies in both.
+    pub fn intersection(self, o: Self) -> Self {
+        Self { min: self.min.max(o.min), max: self.max.min(o.max) }
+    }
+
     /// Half of the surface area; 0 for the empty box.
     pub fn half_area(&self) -> f32 {
         let d = (self.max - self.min).max(Vec3::ZERO);

@@ -34,9 +34,31 @@ struct Plan {
     count: u32,
 }
 
-/// Collapses by least surface area cost. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).
-pub fn collapse(binary: &[BinaryNode], rule: LeafRule, mut leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
-    let plans = plan(binary, rule);
+/// A binary tree, and how it is best collapsed.
+pub struct Collapse {
+    binary: Vec<BinaryNode>,
+    plans: Vec<Plan>,
+}
+
+impl Collapse {
+    /// Finds the wide tree of least surface area cost.
+    pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule) -> Self {
+        let plans = plan(&binary, rule);
+        Self { binary, plans }
+    }
+
+    /// What a random ray costs, in visits of a node times the area of a box.
+    pub fn cost(&self) -> f32 {
+        self.plans[0].cost[0]
+    }
+
+    /// Makes the wide tree. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).
+    pub fn carry_out(self, leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
+        collapse(&self.binary, &self.plans, leaf)
+    }
+}
+
+fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
     let mut out = Collapsed { nodes: Vec::new(), root: LEAF };
     let mut content = Vec::new();
     let mut reference = |at: usize, next_node: usize| {
@@ -58,8 +80,8 @@ pub fn collapse(binary: &[BinaryNode], rule: LeafRule, mut leaf: impl FnMut(&[u3
     while let Some((at, place)) = work.pop() {
         let mut children = Vec::with_capacity(8);
         if let Below::Pair(first) = binary[at].below {
-            gather(binary, &plans, first as usize, plans[at].wide.into(), &mut children);
-            gather(binary, &plans, first as usize + 1, 8 - usize::from(plans[at].wide), &mut children);
+            gather(binary, plans, first as usize, plans[at].wide.into(), &mut children);
+            gather(binary, plans, first as usize + 1, 8 - usize::from(plans[at].wide), &mut children);
         }
         // Any-hit traversal takes children in order: large ones are hit most.
         children.sort_by(|&a, &b| binary[b].bounds.half_area().total_cmp(&binary[a].bounds.half_area()).then(a.cmp(&b)));

@@ -1,8 +1,6 @@
 //! Coordinates in which a tree's boxes fit f32 well, and rays in them.
 
-use std::array::from_fn;
-
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 
 use crate::{math::max_abs, shape::Bounds};
 
@@ -30,16 +28,15 @@ pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
 /// `ratio` times those of the original ray, less `start`.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
-    /// Every array has x, y, z and one place more, which fills a vector.
-    pub(super) origin: [f32; 4],
-    pub(super) direction: [f32; 4],
+    pub(super) origin: Vec3A,
+    pub(super) direction: Vec3A,
     /// Origin as the near bounds see it, and as the far bounds see it.
-    pub(super) origin_near: [f32; 4],
-    pub(super) origin_far: [f32; 4],
-    pub(super) inverse_near: [f32; 4],
-    pub(super) inverse_far: [f32; 4],
-    /// Where the direction is negative: the near bound is the upper one.
-    pub(super) negative: [bool; 3],
+    pub(super) origin_near: Vec3A,
+    pub(super) origin_far: Vec3A,
+    pub(super) inverse_near: Vec3A,
+    pub(super) inverse_far: Vec3A,
+    /// Bit i is set where the direction is negative: the near bound is the upper one.
+    pub(super) negative: u32,
     /// |origin|.
     size: f32,
     /// Bound on what a ray that started anew is wrong by.
@@ -104,21 +101,19 @@ impl Normalisation {
             start = (distance - 2.0) / max_abs(d);
             p += d * start;
         }
-        let origin = [p.x, p.y, p.z, 0.0].map(|x| x as f32);
-        let direction = [d.x, d.y, d.z, 1.0].map(|x| x as f32);
-        let size = origin[0].abs().max(origin[1].abs()).max(origin[2].abs());
+        let (origin, direction) = (p.as_vec3a(), d.as_vec3a());
+        let size = origin.abs().max_element();
         let error = (start * START_ERROR) as f32;
-        let shift = size.max(1.0) * (1.0 / (1 << 22) as f32) + error;
-        let outward = direction.map(|x| shift.copysign(x));
-        let inverse = direction.map(|x| 1.0 / x.abs().max(SMALLEST).copysign(x));
+        let outward = Vec3A::splat(size.max(1.0) * (1.0 / (1 << 22) as f32) + error).copysign(direction);
+        let inverse = (Vec3A::ONE / direction.abs().max(Vec3A::splat(SMALLEST))).copysign(direction);
         BoxRay {
             origin,
             direction,
-            origin_near: from_fn(|i| origin[i] + outward[i]),
-            origin_far: from_fn(|i| origin[i] - outward[i]),
-            inverse_near: inverse.map(|x| x * SHRUNK),
-            inverse_far: inverse.map(|x| x * GROWN),
-            negative: from_fn(|i| direction[i].is_sign_negative()),
+            origin_near: origin + outward,
+            origin_far: origin - outward,
+            inverse_near: inverse * SHRUNK,
+            inverse_far: inverse * GROWN,
+            negative: direction.is_negative_bitmask(),
             size,
             error,
             ratio: self.scale / unit,
@@ -132,8 +127,8 @@ impl BoxRay {
     /// started anew from so far away that its own error is beyond numbers meets nothing.
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
-        let ([x, y, z, _], [dx, dy, dz, _]) = (self.origin, self.direction);
-        (((x + y) + (z + self.magnitude(FINEST))) + (dx + dy + dz)).is_finite()
+        let (p, d) = (self.origin, self.direction);
+        (((p.x + p.y) + (p.z + self.magnitude(FINEST))) + (d.x + d.y + d.z)).is_finite()
     }
 
     /// 1 + |origin|, and as much as covers the ray's own error for a filter that allows for errors of this times `unit`.

@@ -4,7 +4,15 @@ use std::ops::ControlFlow;
 
 use glam::{DVec3, Vec3};
 
-use super::{build::Box3, collapse::LeafRule, frame::Normalisation, pack::{Pack, PackRay}, simd::Lanes, tree::Tree};
+use super::{
+    build::Box3,
+    collapse::{Collapse, LeafRule},
+    frame::Normalisation,
+    pack::{Pack, PackRay},
+    simd::Lanes,
+    split::{References, split},
+    tree::Tree,
+};
 use crate::shape::{
     Bounds, Ray,
     triangle::{Sheared, TriangleHit},
@@ -15,6 +23,8 @@ use crate::shape::{
 pub struct MeshTree {
     tree: Tree,
     packs: Vec<Pack>,
+    /// Whether a triangle may lie in several packs.
+    is_split: bool,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     bounds: Bounds,
@@ -29,6 +39,25 @@ pub struct MeshHit {
     pub at: TriangleHit,
 }
 
+/// A tree over triangles or, where that is cheaper, over parts of triangles.
+struct Plan {
+    tree: Collapse,
+    /// The triangle of each part; none where triangles are whole.
+    triangles: Vec<u32>,
+}
+
+impl Plan {
+    fn best(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let plan = Self { tree: Tree::plan(whole, LEAVES), triangles: Vec::new() };
+        let Some(References { boxes, triangles }) = split(whole, vertices) else { return plan };
+        let parts = Self { tree: Tree::plan(&boxes, LEAVES), triangles };
+        if parts.tree.cost() < plan.tree.cost() { parts } else { plan }
+    }
+}
+
+/// A pack costs less than a node, measured.
+const LEAVES: LeafRule = LeafRule { most: 8, cost: 0.7 };
+
 impl MeshTree {
     /// Builds the tree of at least one triangle; positions are finite and indices in range.
     pub fn build(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
@@ -39,14 +68,17 @@ impl MeshTree {
         positions.iter_mut().zip(&scaled).for_each(|(p, scaled)| *p = frame.unscaled(scaled.as_dvec3()).as_vec3().into());
         let vertices = |triangle: u32| triangles[triangle as usize].map(|i| scaled[i as usize]);
         let boxes: Vec<Box3> = (0..triangles.len() as u32).map(|triangle| Box3::of(vertices(triangle))).collect();
+        let references = Plan::best(&boxes, vertices);
         let mut packs = Vec::new();
-        // A pack costs less than a node, measured.
-        let tree = Tree::over(frame, &boxes, LeafRule { most: 8, cost: 0.7 }, |leaf| {
+        let tree = Tree::carry_out(frame, references.tree, |leaf| {
+            let mut leaf: Vec<u32> = leaf.iter().map(|&part| references.triangles.get(part as usize).copied().unwrap_or(part)).collect();
+            leaf.sort_unstable();
+            leaf.dedup();
             packs.push(Pack::new(leaf.iter().map(|&triangle| (triangle, vertices(triangle)))));
             packs.len() as u32 - 1
         });
         let bounds = Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
-        Self { tree, packs, positions, triangles, bounds }
+        Self { tree, packs, is_split: !references.triangles.is_empty(), positions, triangles, bounds }
     }
 
     /// Number of triangles.
@@ -72,14 +104,11 @@ impl MeshTree {
 
     /// Memory in bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.bytes()
-            + size_of_val(&*self.packs)
-            + size_of_val(&*self.positions)
-            + size_of_val(&*self.triangles)
+        self.tree.bytes() + size_of_val(&*self.packs) + size_of_val(&*self.positions) + size_of_val(&*self.triangles)
     }
 
     /// Calls `visit` with hits in `0 < t <= limit`, of either side, in no particular order; it returns the limit for what follows, or breaks.
-    /// A hit nearer than every limit is never left out.
+    /// A hit nearer than every limit is never left out. No triangle is hit twice if `ANY`.
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
@@ -93,8 +122,11 @@ impl MeshTree {
         let boxed = self.tree.ray::<false>(ray.origin, ray.direction);
         let sheared = Sheared::new(frame.point(ray.origin), ray.direction);
         let filter = PackRay::new(&boxed, &sheared);
-        let mut limit = ray.t_max;
+        let (axes, mut limit) = (sheared.axes(), ray.t_max);
+        let whole = boxed.limit(limit);
+        let mut boxed_limit = whole;
         let mut flow = ControlFlow::Continue(());
+        let mut told = Told::default();
         let leaf = |pack: u32| {
             // SAFETY: the tree's leaves are indices of packs.
             let pack = unsafe { self.packs.get_unchecked(pack as usize) };
@@ -103,9 +135,10 @@ impl MeshTree {
             while candidates != 0 {
                 let slot = candidates.trailing_zeros() as usize;
                 candidates &= candidates - 1;
-                let Some(at) = sheared.hit(pack.triangle(slot)) else { continue };
+                // SAFETY: a candidate is one of eight, and axes are axes.
+                let Some(at) = sheared.hit(unsafe { pack.triangle(slot, axes) }) else { continue };
                 let at = TriangleHit { t: frame.unscaled(at.t), ..at };
-                if at.t > limit {
+                if at.t > limit || (ANY && self.is_split && !told.is_new(pack.id(slot))) {
                     continue;
                 }
                 match visit(MeshHit { triangle: pack.id(slot), at }) {
@@ -115,11 +148,35 @@ impl MeshTree {
                         return ControlFlow::Break(());
                     }
                 }
+                boxed_limit = boxed.limit(limit);
             }
-            ControlFlow::Continue(boxed.limit(limit))
+            ControlFlow::Continue(boxed_limit)
         };
         // SAFETY: the caller has the instructions of `L`.
-        unsafe { self.tree.visit::<L, ANY>(&boxed, boxed.limit(ray.t_max), leaf) };
+        unsafe { self.tree.visit::<L, ANY>(&boxed, whole, leaf) };
         flow
+    }
+}
+
+/// The triangles that a ray has been told of.
+#[derive(Default)]
+struct Told {
+    first: [u32; 8],
+    count: usize,
+    /// What the first places cannot hold: few rays go through so many surfaces and on.
+    more: Vec<u32>,
+}
+
+impl Told {
+    #[inline(always)]
+    fn is_new(&mut self, triangle: u32) -> bool {
+        let known = self.first.iter().take(self.count).chain(&self.more).any(|&other| other == triangle);
+        if !known {
+            match self.first.get_mut(self.count) {
+                Some(place) => (*place, self.count) = (triangle, self.count + 1),
+                None => self.more.push(triangle),
+            }
+        }
+        !known
     }
 }

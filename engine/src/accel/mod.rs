@@ -17,6 +17,7 @@ mod pack;
 mod pencil;
 mod simd;
 mod spheres;
+mod split;
 mod traverse;
 mod tree;
 

@@ -1,16 +1,18 @@
 //! Eight triangles at a time: the conservative f32 filter before the exact test, and what that test reads.
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
-use super::{frame::{BoxRay, FINEST}, simd::Lanes};
+use super::{
+    frame::{BoxRay, FINEST},
+    simd::Lanes,
+};
 use crate::{math::max_abs, shape::triangle::Sheared};
 
 /// A ray as the filter sees it.
 #[derive(Clone, Copy, Debug)]
 pub struct PackRay {
-    /// Axes in the order of the shear.
+    /// The ray's own axes, in which everything else is given.
     axes: [usize; 3],
-    /// In that order.
     origin: [f32; 3],
     shear: [f32; 2],
     /// Slack is `(extent + near) * slack`.
@@ -23,11 +25,12 @@ impl PackRay {
     #[inline(always)]
     pub fn new(ray: &BoxRay, sheared: &Sheared) -> Self {
         let magnitude = ray.magnitude(FINEST);
-        let axes = sheared.axes();
+        let [x, y, z] = sheared.axes();
+        let [sx, sy] = sheared.shear();
         Self {
-            axes,
-            origin: axes.map(|axis| ray.origin[axis]),
-            shear: sheared.shear().map(|x| x as f32),
+            axes: [x, y, z],
+            origin: [ray.origin[x], ray.origin[y], ray.origin[z]],
+            shear: [sx as f32, sy as f32],
             near: magnitude * (1.0 / (1 << 22) as f32),
             slack: magnitude * (1.0 / (1 << 17) as f32),
         }
@@ -83,10 +86,16 @@ impl Pack {
         self.ids[slot]
     }
 
-    /// The triangle in a place.
+    /// The triangle in a place, in a ray's own axes.
+    ///
+    /// # Safety
+    /// The place is below 8, axes are below 3.
     #[inline(always)]
-    pub fn triangle(&self, slot: usize) -> [DVec3; 3] {
-        self.vertices.each_ref().map(|[x, y, z]| DVec3::new(x[slot].into(), y[slot].into(), z[slot].into()))
+    pub unsafe fn triangle(&self, slot: usize, [x, y, z]: [usize; 3]) -> [[f64; 3]; 3] {
+        // SAFETY: by this function's own condition.
+        let at = |vertex: &[[f32; 8]; 3], axis: usize| unsafe { f64::from(*vertex.get_unchecked(axis).get_unchecked(slot)) };
+        let [a, b, c] = &self.vertices;
+        [[at(a, x), at(a, y), at(a, z)], [at(b, x), at(b, y), at(b, z)], [at(c, x), at(c, y), at(c, z)]]
     }
 
     /// Bit i is set where the line of the ray may meet triangle i.

@@ -1,6 +1,8 @@
 //! The walk through a tree: one body for nearest and any hit, for every vector width.
 
-use std::{array::from_fn, mem::MaybeUninit, ops::ControlFlow};
+use std::{mem::MaybeUninit, ops::ControlFlow};
+
+use glam::Vec3A;
 
 use super::{
     frame::BoxRay,
@@ -32,10 +34,11 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     }
     // SAFETY: by this function's own conditions.
     unsafe {
-        let lanes = |v: [f32; 4]| [L::splat(v[0]), L::splat(v[1]), L::splat(v[2])];
+        let lanes = |v: Vec3A| [L::splat(v.x), L::splat(v.y), L::splat(v.z)];
         let (origin_near, origin_far) = (lanes(ray.origin_near), lanes(ray.origin_far));
         let (inverse_near, inverse_far) = (lanes(ray.inverse_near), lanes(ray.inverse_far));
-        let near_bound: [usize; 3] = from_fn(|axis| axis + if ray.negative[axis] { 3 } else { 0 });
+        let near_bound = |axis: u32| axis as usize + if ray.negative >> axis & 1 == 1 { 3 } else { 0 };
+        let near_bound = [near_bound(0), near_bound(1), near_bound(2)];
         let zero = L::splat(0.0);
         let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
         let stack = stack.as_mut_ptr().cast::<u64>();

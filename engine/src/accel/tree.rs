@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use super::{
     build::{self, Box3},
-    collapse::{Collapsed, LeafRule, collapse},
+    collapse::{Collapse, Collapsed, LeafRule},
     frame::{BoxRay, Normalisation},
     median,
-    node::Node,
+    node::{LEAF, Node},
     simd::Lanes,
     traverse::{MAX_DEPTH, traverse},
 };
@@ -30,14 +30,18 @@ impl Tree {
         let frame = Normalisation::of(boxes.iter().fold(Bounds::EMPTY, |sum, b| sum.union(*b)));
         let normalised: Vec<Box3> =
             boxes.iter().map(|b| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() }).collect();
-        Self::over(frame, &normalised, rule, leaf)
+        Self::carry_out(frame, Self::plan(&normalised, rule), leaf)
     }
 
-    /// The same over boxes that are in normalised coordinates already.
-    pub fn over(frame: Normalisation, boxes: &[Box3], rule: LeafRule, leaf: impl FnMut(&[u32]) -> u32) -> Self {
+    /// The best tree over boxes in normalised coordinates.
+    pub fn plan(boxes: &[Box3], rule: LeafRule) -> Collapse {
         let binary = build::build(boxes);
-        let binary = if depth_fits(&binary) { binary } else { median::build(boxes) };
-        let Collapsed { nodes, root } = collapse(&binary, rule, leaf);
+        Collapse::plan(if depth_fits(&binary) { binary } else { median::build(boxes) }, rule)
+    }
+
+    /// Makes a planned tree. `leaf` as for [`Self::build`].
+    pub fn carry_out(frame: Normalisation, plan: Collapse, leaf: impl FnMut(&[u32]) -> u32) -> Self {
+        let Collapsed { nodes, root } = plan.carry_out(leaf);
         Self { frame, nodes, root }
     }
 
@@ -45,6 +49,12 @@ impl Tree {
     #[inline(always)]
     pub fn frame(&self) -> &Normalisation {
         &self.frame
+    }
+
+    /// What visits would be given, where there is nothing but one leaf.
+    #[inline(always)]
+    pub fn only_leaf(&self) -> Option<u32> {
+        (self.root & LEAF != 0).then_some(self.root & !LEAF)
     }
 
     /// Prepares a ray for [`Tree::visit`].

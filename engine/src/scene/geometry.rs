@@ -122,8 +122,7 @@ impl Geometry {
         add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds(self.meshes[s.shape.mesh as usize].tree.bounds())));
         let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
         self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
-        self.tree =
-            (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
+        self.tree = (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
     }
 }
 

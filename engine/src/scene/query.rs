@@ -199,6 +199,11 @@ impl Scene {
             }
         }
         let Some(tree) = &geometry.tree else { return best };
+        if let Some(reference) = tree.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH) {
+            // SAFETY: the caller has the instructions of `L`.
+            unsafe { L::closest_of_mesh(self, ray, reference, &mut best) }
+            return best;
+        }
         let boxed = tree.ray::<true>(ray.origin, ray.direction);
         let limit = boxed.limit(best.t);
         let leaf = |reference: u32| {
@@ -277,6 +282,10 @@ impl Scene {
             }
         }
         let Some(tree) = &geometry.tree else { return false };
+        if let Some(reference) = tree.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH) {
+            // SAFETY: the caller has the instructions of `L`.
+            return unsafe { L::any_of_mesh(self, ray, reference, &mut blocked) };
+        }
         let boxed = tree.ray::<true>(ray.origin, ray.direction);
         let limit = boxed.limit(ray.t_max);
         let mut found = false;

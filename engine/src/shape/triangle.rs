@@ -6,15 +6,15 @@
 
 use glam::DVec3;
 
-/// A ray made ready for triangles.
+/// A ray made ready for triangles. Its axes are turned so that the direction's largest component comes last.
 #[derive(Clone, Copy, Debug)]
 pub struct Sheared {
-    origin: DVec3,
-    direction: DVec3,
-    /// Axes: the largest of the direction's components is z.
+    /// Which axis of the world each of its own is.
     axes: [usize; 3],
-    /// Shear and scale.
-    shear: DVec3,
+    origin: [f64; 3],
+    direction: [f64; 3],
+    /// How far the first and the second axis lean along the last, and the last one's scale.
+    shear: [f64; 3],
 }
 
 /// A hit: `t` and the barycentric coordinates of the second and third vertex.
@@ -42,48 +42,98 @@ impl Sheared {
         } else {
             2
         };
-        let (x, y) = ([1, 2, 0][z], [2, 0, 1][z]);
-        let scale = 1.0 / direction[z];
-        Self { origin, direction, axes: [x, y, z], shear: DVec3::new(direction[x] * scale, direction[y] * scale, scale) }
+        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        let (origin, direction) = (turned(axes, origin), turned(axes, direction));
+        let scale = 1.0 / direction[2];
+        Self { axes, origin, direction, shear: [direction[0] * scale, direction[1] * scale, scale] }
     }
 
-    /// Axes: that of the direction's largest component is the last.
+    /// Which axis of the world each of the ray's own is.
     #[inline(always)]
     pub fn axes(&self) -> [usize; 3] {
         self.axes
     }
 
+    /// The start, in the ray's own axes.
+    #[inline(always)]
+    pub fn origin(&self) -> [f64; 3] {
+        self.origin
+    }
+
     /// How far the first and the second axis lean along the last.
     #[inline(always)]
     pub fn shear(&self) -> [f64; 2] {
-        [self.shear.x, self.shear.y]
+        [self.shear[0], self.shear[1]]
     }
 
-    /// The hit with `t > 0`, of either side.
+    /// A triangle in the ray's own axes.
     #[inline(always)]
-    pub fn hit(&self, vertices: [DVec3; 3]) -> Option<TriangleHit> {
-        let [x, y, z] = self.axes;
-        let relative = vertices.map(|vertex| vertex - self.origin);
-        let [a, b, c] = relative.map(|p| (p[x] - self.shear.x * p[z], p[y] - self.shear.y * p[z]));
-        let u = c.0 * b.1 - c.1 * b.0;
-        let v = a.0 * c.1 - a.1 * c.0;
-        let w = b.0 * a.1 - b.1 * a.0;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+    pub fn turned(&self, [a, b, c]: [DVec3; 3]) -> [[f64; 3]; 3] {
+        [turned(self.axes, a), turned(self.axes, b), turned(self.axes, c)]
+    }
+
+    /// The hit with `t > 0`, of either side, of a triangle in the ray's own axes.
+    #[inline(always)]
+    pub fn hit(&self, [a, b, c]: [[f64; 3]; 3]) -> Option<TriangleHit> {
+        let (near_a, near_b, near_c) = (less(a, self.origin), less(b, self.origin), less(c, self.origin));
+        let ((ax, ay), (bx, by), (cx, cy)) = (self.project(near_a), self.project(near_b), self.project(near_c));
+        let u = cx * by - cy * bx;
+        let v = ax * cy - ay * cx;
+        let w = bx * ay - by * ax;
+        // Without branches, of which nobody could foretell the way.
+        if ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0)) {
             return None;
         }
         let sum = u + v + w;
         if sum == 0.0 {
             return None;
         }
-        let (b1, b2) = (v / sum, w / sum);
         // Along the normal, the distance to the plane keeps its accuracy however thin the triangle is: vertices are f32, so the edges are
         // nearly exact. At grazing angles the depths of the vertices bound it.
-        let normal = geometric_normal(vertices);
-        let t = normal.dot(relative[0]) / normal.dot(self.direction);
-        let [da, db, dc] = relative.map(|p| p[z] * self.shear.z);
-        let t = t.max(da.min(db).min(dc)).min(da.max(db).max(dc));
-        (t > 0.0).then_some(TriangleHit { t, b1, b2, front: normal.dot(self.direction) < 0.0 })
+        let normal = cross(less(b, a), less(c, a));
+        let approach = dot(normal, self.direction);
+        let t = dot(normal, near_a) / approach;
+        let (da, db, dc) = (near_a[2] * self.shear[2], near_b[2] * self.shear[2], near_c[2] * self.shear[2]);
+        let t = least(greatest(t, least(least(da, db), dc)), greatest(greatest(da, db), dc));
+        (t > 0.0).then(|| TriangleHit { t, b1: v / sum, b2: w / sum, front: approach < 0.0 })
     }
+
+    /// Where a point lies beside the ray.
+    #[inline(always)]
+    fn project(&self, [x, y, z]: [f64; 3]) -> (f64, f64) {
+        (x - self.shear[0] * z, y - self.shear[1] * z)
+    }
+}
+
+/// The smaller one, or `b` where they cannot be compared: one instruction.
+#[inline(always)]
+fn least(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn greatest(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn turned([x, y, z]: [usize; 3], v: DVec3) -> [f64; 3] {
+    [v[x], v[y], v[z]]
+}
+
+#[inline(always)]
+fn less(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
+}
+
+#[inline(always)]
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 /// Normal on the counter-clockwise side, of twice the area's length.

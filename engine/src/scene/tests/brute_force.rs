@@ -26,7 +26,7 @@ fn nearest(geometry: &Geometry, ray: &Ray) -> Option<(f64, u32)> {
     for p in &geometry.instances {
         let local = ray.transformed(&p.shape.transform.to_object);
         let (sheared, mesh) = (Sheared::new(local.origin, local.direction), &geometry.meshes[p.shape.mesh as usize].tree);
-        let of_triangle = |triangle| Some((sheared.hit(mesh.vertices(triangle))?.t, p.object));
+        let of_triangle = |triangle| Some((sheared.hit(sheared.turned(mesh.vertices(triangle)))?.t, p.object));
         hits.extend((0..mesh.count() as u32).filter_map(of_triangle).filter(|(t, _)| *t < ray.t_max));
     }
     hits.into_iter().min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
