@@ -2,6 +2,7 @@
 
 use super::{
     build::{Below, BinaryNode, Box3},
+    frame::OUTWARD,
     node::{LEAF, Node},
 };
 
@@ -89,8 +90,8 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
         for (slot, &child) in children.iter().enumerate() {
             let Box3 { min, max } = binary[child].bounds;
             for axis in 0..3 {
-                node.bounds[axis][slot] = min[axis];
-                node.bounds[3 + axis][slot] = max[axis];
+                node.bounds[axis][slot] = min[axis] - OUTWARD;
+                node.bounds[3 + axis][slot] = max[axis] + OUTWARD;
             }
             let (reference, inner) = reference(child, out.nodes.len());
             node.children[slot] = reference;

@@ -20,19 +20,25 @@ const START_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
 /// Smallest unit of error that filters allow for.
 pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
 
+/// How much larger the boxes of nodes are than what they hold, on every side. With u = 2^-24, this covers the rounding of a ray's origin, of up to 4 u, of a
+/// box, of its growing, and what a ray that started anew is wrong by, of u each.
+pub const OUTWARD: f32 = 1.0 / (1 << 21) as f32;
+
+/// From here on a ray starts anew.
+const FAR: f64 = 4.0;
+
+/// Most that a ray which started anew may be wrong by for its boxes to be believed.
+const NEARLY: f32 = 1.0 / (1 << 24) as f32;
+
 /// A ray in normalised coordinates, ready for conservative tests against f32 boxes.
 ///
-/// Rounding is covered twice: the origin is moved outwards by `2^-22 max(1, |origin|)` on the side that each bound is compared with, which covers the
-/// rounding of the origin and of the boxes, and reciprocals are shrunk for near bounds and grown for far bounds by 2^-21, which covers the four
-/// roundings of a product. A ray from far away starts anew before the tree, so that its rounding is that of a near one. Parameters are
+/// Rounding is covered twice: boxes are larger by `OUTWARD` than what they hold, and reciprocals are shrunk for near bounds and grown for far bounds by 2^-21,
+/// which covers the four roundings of a product. A ray from far away starts anew before the tree, so that its rounding is that of a near one. Parameters are
 /// `ratio` times those of the original ray, less `start`.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
     pub(super) origin: Vec3A,
     pub(super) direction: Vec3A,
-    /// Origin as the near bounds see it, and as the far bounds see it.
-    pub(super) origin_near: Vec3A,
-    pub(super) origin_far: Vec3A,
     pub(super) inverse_near: Vec3A,
     pub(super) inverse_far: Vec3A,
     /// Bit i is set where the direction is negative: the near bound is the upper one.
@@ -84,13 +90,9 @@ impl Normalisation {
     /// A ray in normalised coordinates. `direction` has any length but 0.
     #[inline(always)]
     pub fn ray<const UNIT_LENGTH: bool>(&self, origin: DVec3, direction: DVec3) -> BoxRay {
-        /// From here on a ray starts anew.
-        const FAR: f64 = 4.0;
-        /// Components of the direction below this are raised to it: over the distances that matter, up to 4 (1 + |origin|), the change
-        /// stays far below the outward shift of the origin.
+        /// Components of the direction below this are raised to it: over the distances that matter the change stays far below `OUTWARD`.
         const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
-        const SHRUNK: f32 = 1.0 - 1.0 / (1 << 21) as f32;
-        const GROWN: f32 = 1.0 + 1.0 / (1 << 21) as f32;
+        const SLACK: f32 = 1.0 / (1 << 21) as f32;
         let unit = if UNIT_LENGTH { 1.0 } else { inverse_power_of_two(max_abs(direction)) };
         let mut p = self.point(origin);
         let d = direction * unit;
@@ -104,15 +106,14 @@ impl Normalisation {
         let (origin, direction) = (p.as_vec3a(), d.as_vec3a());
         let size = origin.abs().max_element();
         let error = (start * START_ERROR) as f32;
-        let outward = Vec3A::splat(size.max(1.0) * (1.0 / (1 << 22) as f32) + error).copysign(direction);
+        // From so far away that boxes cannot tell what it meets, it enters and leaves all of them at once.
+        let (shrunk, grown) = if error > NEARLY { (0.0, 0.0) } else { (1.0 - SLACK, 1.0 + SLACK) };
         let inverse = (Vec3A::ONE / direction.abs().max(Vec3A::splat(SMALLEST))).copysign(direction);
         BoxRay {
             origin,
             direction,
-            origin_near: origin + outward,
-            origin_far: origin - outward,
-            inverse_near: inverse * SHRUNK,
-            inverse_far: inverse * GROWN,
+            inverse_near: inverse * shrunk,
+            inverse_far: inverse * grown,
             negative: direction.is_negative_bitmask(),
             size,
             error,
@@ -123,12 +124,12 @@ impl Normalisation {
 }
 
 impl BoxRay {
-    /// Whether all its numbers are some. A ray from where numbers end has none, and every comparison would let it into boxes that are not there. One that
-    /// started anew from so far away that its own error is beyond numbers meets nothing.
+    /// Whether it may meet anything. A ray from where numbers end has none, and every comparison would let it into boxes that are not there. One that started
+    /// anew has come to within `FAR` of the centre, if it is to meet anything: where its largest component gets into the tree, so do the
+    /// others, not more than 3 later.
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
-        let (p, d) = (self.origin, self.direction);
-        (((p.x + p.y) + (p.z + self.magnitude(FINEST))) + (d.x + d.y + d.z)).is_finite()
+        (self.magnitude(FINEST) + self.direction.element_sum()).is_finite() && (self.size <= 1.125 * FAR as f32 || self.error > NEARLY)
     }
 
     /// 1 + |origin|, and as much as covers the ray's own error for a filter that allows for errors of this times `unit`.

@@ -122,7 +122,7 @@ impl MeshTree {
         let boxed = self.tree.ray::<false>(ray.origin, ray.direction);
         let sheared = Sheared::new(frame.point(ray.origin), ray.direction);
         let filter = PackRay::new(&boxed, &sheared);
-        let (axes, mut limit) = (sheared.axes(), ray.t_max);
+        let mut limit = ray.t_max;
         let whole = boxed.limit(limit);
         let mut boxed_limit = whole;
         let mut flow = ControlFlow::Continue(());
@@ -135,8 +135,8 @@ impl MeshTree {
             while candidates != 0 {
                 let slot = candidates.trailing_zeros() as usize;
                 candidates &= candidates - 1;
-                // SAFETY: a candidate is one of eight, and axes are axes.
-                let Some(at) = sheared.hit(unsafe { pack.triangle(slot, axes) }) else { continue };
+                // SAFETY: a candidate is one of eight.
+                let Some(at) = (unsafe { pack.hit(slot, &sheared) }) else { continue };
                 let at = TriangleHit { t: frame.unscaled(at.t), ..at };
                 if at.t > limit || (ANY && self.is_split && !told.is_new(pack.id(slot))) {
                     continue;

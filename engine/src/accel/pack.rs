@@ -6,7 +6,10 @@ use super::{
     frame::{BoxRay, FINEST},
     simd::Lanes,
 };
-use crate::{math::max_abs, shape::triangle::Sheared};
+use crate::{
+    math::max_abs,
+    shape::triangle::{Sheared, TriangleHit},
+};
 
 /// A ray as the filter sees it.
 #[derive(Clone, Copy, Debug)]
@@ -86,16 +89,17 @@ impl Pack {
         self.ids[slot]
     }
 
-    /// The triangle in a place, in a ray's own axes.
+    /// Where a ray hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
     ///
     /// # Safety
-    /// The place is below 8, axes are below 3.
-    #[inline(always)]
-    pub unsafe fn triangle(&self, slot: usize, [x, y, z]: [usize; 3]) -> [[f64; 3]; 3] {
-        // SAFETY: by this function's own condition.
+    /// The place is below 8.
+    #[inline(never)]
+    pub unsafe fn hit(&self, slot: usize, ray: &Sheared) -> Option<TriangleHit> {
+        let [x, y, z] = ray.axes();
+        // SAFETY: by this function's own condition; axes are below 3.
         let at = |vertex: &[[f32; 8]; 3], axis: usize| unsafe { f64::from(*vertex.get_unchecked(axis).get_unchecked(slot)) };
         let [a, b, c] = &self.vertices;
-        [[at(a, x), at(a, y), at(a, z)], [at(b, x), at(b, y), at(b, z)], [at(c, x), at(c, y), at(c, z)]]
+        ray.hit([[at(a, x), at(a, y), at(a, z)], [at(b, x), at(b, y), at(b, z)], [at(c, x), at(c, y), at(c, z)]])
     }
 
     /// Bit i is set where the line of the ray may meet triangle i.

@@ -2,11 +2,9 @@
 
 use std::{mem::MaybeUninit, ops::ControlFlow};
 
-use glam::Vec3A;
-
 use super::{
     frame::BoxRay,
-    node::{LEAF, Node},
+    node::{BOUND, LEAF, Node},
     simd::Lanes,
 };
 
@@ -34,11 +32,13 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     }
     // SAFETY: by this function's own conditions.
     unsafe {
-        let lanes = |v: Vec3A| [L::splat(v.x), L::splat(v.y), L::splat(v.z)];
-        let (origin_near, origin_far) = (lanes(ray.origin_near), lanes(ray.origin_far));
-        let (inverse_near, inverse_far) = (lanes(ray.inverse_near), lanes(ray.inverse_far));
-        let near_bound = |axis: u32| axis as usize + if ray.negative >> axis & 1 == 1 { 3 } else { 0 };
-        let near_bound = [near_bound(0), near_bound(1), near_bound(2)];
+        let (ox, oy, oz) = (L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z));
+        let (nx, ny, nz) = (L::splat(ray.inverse_near.x), L::splat(ray.inverse_near.y), L::splat(ray.inverse_near.z));
+        let (fx, fy, fz) = (L::splat(ray.inverse_far.x), L::splat(ray.inverse_far.y), L::splat(ray.inverse_far.z));
+        // In bytes, so that nothing is multiplied on the way.
+        let near_bound = |axis: u32| BOUND * (axis as usize + if ray.negative >> axis & 1 == 1 { 3 } else { 0 });
+        let (near_x, near_y, near_z) = (near_bound(0), near_bound(1), near_bound(2));
+        let (far_x, far_y, far_z) = (3 * BOUND - near_x, 5 * BOUND - near_y, 7 * BOUND - near_z);
         let zero = L::splat(0.0);
         let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
         let stack = stack.as_mut_ptr().cast::<u64>();
@@ -48,13 +48,12 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
         loop {
             if current & LEAF == 0 {
                 let node = nodes.get_unchecked(current as usize);
-                let near =
-                    |axis: usize| L::load(node.bounds.get_unchecked(near_bound[axis])).sub(origin_near[axis]).mul(inverse_near[axis]);
-                let far = |axis: usize| {
-                    L::load(node.bounds.get_unchecked(2 * axis + 3 - near_bound[axis])).sub(origin_far[axis]).mul(inverse_far[axis])
-                };
-                let enter = near(0).max(near(1)).max(near(2).max(zero));
-                let leave = far(0).min(far(1)).min(far(2).min(L::splat(limit)));
+                let (enter_x, leave_x) = (node.distance(near_x, ox, nx), node.distance(far_x, ox, fx));
+                let (enter_y, leave_y) = (node.distance(near_y, oy, ny), node.distance(far_y, oy, fy));
+                let (enter_z, leave_z) = (node.distance(near_z, oz, nz), node.distance(far_z, oz, fz));
+                // Of two of which one is no number, `max` takes the second: an empty place then has no number to enter at.
+                let enter = enter_x.max(enter_y).max(zero.max(enter_z));
+                let leave = leave_x.min(leave_y).min(leave_z.min(L::splat(limit)));
                 let mut hits = enter.le(leave);
                 if hits != 0 {
                     let first = hits.trailing_zeros() as usize;
