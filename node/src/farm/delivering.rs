@@ -108,7 +108,7 @@ impl Job {
     }
 
     /// Attempts at a part that may still end well.
-    fn open_attempts(&self, part: PartId) -> Vec<LeaseId> {
+    pub(super) fn open_attempts(&self, part: PartId) -> Vec<LeaseId> {
         let state = self.part(part);
         if state.attempts.len() < ATTEMPTS_LISTED_PER_PART {
             return state.attempts.iter().map(|attempt| attempt.lease).filter(|lease| self.leases.contains_key(lease)).collect();

@@ -41,12 +41,22 @@ impl Job {
             let reason = format!("{NARROWED_PER_JOB} parts could not be rendered: {}", self.first_failures());
             return self.end(turn, nodes, Outcome::Failed { reason });
         }
+        self.await_lanes(turn, nodes, id);
         self.cancel_attempts(turn, nodes, id, "its part failed on others");
         let first = PartId(self.parts.len() as u32);
         if !small && self.replace(turn, id, &quarters, "because it failed") {
             self.parts[first.0 as usize..].iter_mut().for_each(|piece| piece.suspect = true);
         } else {
             self.give_up(turn, id);
+        }
+    }
+
+    /// Lanes that still render a part that failed on others get nothing else before they let go of it: their nodes may be dying of it.
+    fn await_lanes(&self, turn: &mut Turn, nodes: &mut Nodes, id: PartId) {
+        for lease in self.open_attempts(id) {
+            if let Some(of) = self.leases.get(&lease).filter(|of| of.begun.is_some()) {
+                self.take_to_hang(turn, nodes, of.node, lease);
+            }
         }
     }
 

@@ -30,7 +30,7 @@ pub(super) struct Node {
     pub heard: Duration,
     /// Attempts that it holds and that are not stray, of all jobs, in the order in which they were handed out.
     pub held: Vec<Held>,
-    /// Attempts that took so long that their lanes are taken to hang.
+    /// Attempts whose lanes are taken to hang: they took too long, or their parts failed on others.
     pub hanging: BTreeSet<(JobId, LeaseId)>,
     /// What it gets in advance.
     pub depth: Depth,

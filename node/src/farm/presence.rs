@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::auditing::quarantined;
 use super::node::{Node, NodeState};
-use super::{Command, Farm, FarmConfig, Incarnation, NodeInfo, ToNode};
+use super::{Command, Farm, FarmConfig, Incarnation, JobId, LeaseId, NodeInfo, ToNode};
 use crate::limits::NODES;
 use crate::manifest::EventKind;
 use crate::schedule::NodeId;
@@ -135,8 +135,16 @@ impl Farm {
             self.note(EventKind::Lost, node, reason.to_owned());
         }
         let reason = reason.to_owned();
+        // It may have died of what it was told to stop: then nothing else is to blame.
+        let crashed = crashed && self.nodes.get(&node).is_some_and(|known| self.not_let_go(known).is_empty());
         self.with_open(|job, turn, nodes| job.node_lost(turn, nodes, node, &reason, crashed));
         self.nodes.entry(node).and_modify(Node::empty);
+    }
+
+    /// Attempts that do not count any more, and that a node, told to stop them, may still be at.
+    pub(super) fn not_let_go(&self, node: &Node) -> Vec<(JobId, LeaseId)> {
+        let open = |job: &JobId, lease| self.jobs.get(job).is_some_and(|job| job.leases.contains_key(lease));
+        node.hanging.iter().filter(|(job, lease)| !open(job, lease)).copied().collect()
     }
 
     fn note(&mut self, kind: EventKind, node: NodeId, detail: String) {

@@ -55,10 +55,16 @@ impl Job {
         let detail = format!("{seconds:.1} s for what should take {:.1} s", state.expected * seconds / took.max(f64::MIN_POSITIVE));
         state.expected = state.expected.max(took);
         self.log.event(turn.now, EventKind::Overdue, Some(node), vec![part], detail);
-        nodes.entry(node).and_modify(|node| _ = node.hanging.insert((self.id, lease)));
+        self.take_to_hang(turn, nodes, node, lease);
         self.set_aside(turn, nodes, lease);
-        if nodes.get(&node).is_some_and(|node| node.lanes() == 0) {
-            turn.stuck.insert(node);
+    }
+
+    /// The lane of an attempt gets nothing before it answers; without another one, its node holds nothing.
+    pub(super) fn take_to_hang(&self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, lease: LeaseId) {
+        let Some(node) = nodes.get_mut(&id) else { return };
+        node.hanging.insert((self.id, lease));
+        if node.lanes() == 0 {
+            turn.stuck.insert(id);
         }
     }
 }

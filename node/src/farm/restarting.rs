@@ -34,10 +34,8 @@ impl Farm {
         if node.state == NodeState::Proving {
             self.turn.send(id, node, ToNode::Prove);
         }
-        for (job, lease) in &node.hanging {
-            if self.jobs.get(job).is_none_or(|job| !job.leases.contains_key(lease)) {
-                self.turn.send(id, node, ToNode::Cancel { job: *job, lease: *lease });
-            }
+        for (job, lease) in self.not_let_go(node) {
+            self.turn.send(id, node, ToNode::Cancel { job, lease });
         }
         self.with_open(|job, turn, nodes| job.repeat_orders(turn, nodes, id));
     }

@@ -1,5 +1,6 @@
 //! Transitions of the state machine, one by one. Whole schedules of faults are the simulator's.
 
+mod failing;
 mod queue;
 
 use std::collections::BTreeMap;
@@ -38,7 +39,11 @@ impl Bench {
     }
 
     fn ready(&mut self, node: u32, life: u64) {
-        let info = NodeInfo { name: format!("n{node}"), lanes: 1, build: "b".into(), address: "a".into() };
+        self.joins(node, life, 1);
+    }
+
+    fn joins(&mut self, node: u32, life: u64, lanes: u32) {
+        let info = NodeInfo { name: format!("n{node}"), lanes, build: "b".into(), address: "a".into() };
         self.does(Event::NodeJoined { node: NodeId(node), incarnation: Incarnation(life), info });
         assert!(self.said.contains(&send(node, life, ToNode::Prove)));
         self.does(Event::NodeProved { node: NodeId(node), incarnation: Incarnation(life), canary: BUILD.canary });
