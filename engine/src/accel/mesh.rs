@@ -9,6 +9,7 @@ use super::{
     collapse::{Collapse, LeafRule},
     frame::Normalisation,
     pack::{Pack, PackRay},
+    pages::settle,
     simd::Lanes,
     split::{References, split},
     tree::Tree,
@@ -78,7 +79,7 @@ impl MeshTree {
             packs.len() as u32 - 1
         });
         let bounds = Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
-        Self { tree, packs, is_split: !references.triangles.is_empty(), positions, triangles, bounds }
+        Self { tree, packs: settle(packs), is_split: !references.triangles.is_empty(), positions, triangles, bounds }
     }
 
     /// Number of triangles.

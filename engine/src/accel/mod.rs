@@ -14,6 +14,7 @@ mod median;
 mod mesh;
 mod node;
 mod pack;
+mod pages;
 mod pencil;
 mod simd;
 mod spheres;

@@ -27,12 +27,12 @@ impl PackRay {
     /// The same ray twice.
     #[inline(always)]
     pub fn new(ray: &BoxRay, sheared: &Sheared) -> Self {
-        let magnitude = ray.magnitude(FINEST);
+        let (magnitude, origin) = (ray.magnitude(FINEST), ray.origin.to_array());
         let [x, y, z] = sheared.axes();
         let [sx, sy] = sheared.shear();
         Self {
             axes: [x, y, z],
-            origin: [ray.origin[x], ray.origin[y], ray.origin[z]],
+            origin: [origin[x], origin[y], origin[z]],
             shear: [sx as f32, sy as f32],
             near: magnitude * (1.0 / (1 << 22) as f32),
             slack: magnitude * (1.0 / (1 << 17) as f32),

@@ -10,6 +10,7 @@ use super::{
     frame::{BoxRay, Normalisation},
     median,
     node::{LEAF, Node},
+    pages::settle,
     simd::Lanes,
     traverse::{MAX_DEPTH, traverse},
 };
@@ -42,7 +43,7 @@ impl Tree {
     /// Makes a planned tree. `leaf` as for [`Self::build`].
     pub fn carry_out(frame: Normalisation, plan: Collapse, leaf: impl FnMut(&[u32]) -> u32) -> Self {
         let Collapsed { nodes, root } = plan.carry_out(leaf);
-        Self { frame, nodes, root }
+        Self { frame, nodes: settle(nodes), root }
     }
 
     /// Its coordinates.

@@ -118,6 +118,8 @@ fn greatest(a: f64, b: f64) -> f64 {
 
 #[inline(always)]
 fn turned([x, y, z]: [usize; 3], v: DVec3) -> [f64; 3] {
+    // Not of the vector itself, which would branch for every component.
+    let v = v.to_array();
     [v[x], v[y], v[z]]
 }
 

@@ -1,0 +1,27 @@
+//! Memory for large trees: in large pages, where the system has them, so that a walk does not wait for addresses to be translated.
+
+/// The same values, in memory of their own that is as large as they are.
+pub fn settle<T: Copy>(from: Vec<T>) -> Vec<T> {
+    let mut to = Vec::with_capacity(from.len());
+    ask_for_large_pages(&mut to);
+    to.extend_from_slice(&from);
+    to
+}
+
+#[cfg(target_os = "linux")]
+fn ask_for_large_pages<T>(memory: &mut Vec<T>) {
+    use rustix::mm::{Advice, madvise};
+    const PAGE: usize = 2 << 20;
+    let bytes = memory.capacity() * size_of::<T>();
+    let start = memory.as_mut_ptr().cast::<u8>();
+    let skipped = start.align_offset(PAGE);
+    let whole = bytes.saturating_sub(skipped) / PAGE * PAGE;
+    if whole > 0 {
+        // Where it is refused, pages stay small.
+        // SAFETY: the range lies in the vector's own memory, and the advice changes nothing of what that holds.
+        let _: rustix::io::Result<()> = unsafe { madvise(start.add(skipped).cast(), whole, Advice::LinuxHugepage) };
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+fn ask_for_large_pages<T>(_: &mut Vec<T>) {}
