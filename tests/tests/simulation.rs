@@ -63,6 +63,7 @@ fn schedules_that_broke_promises_once_keep_them() {
         (397_545, "a node was asked twice to compare the same part"),
         (646_610, "attempts found on disk let the farm give names again that a crash had made it forget: wrong pixels"),
         (114_250, "nodes died of a part that they had been told to stop, and another was blamed that they had been given since: two holes"),
+        (586_665, "a node was given back what a renewed connection had swallowed, and its lanes were taken to hang for ever"),
         (1_252_579, "one death of a node with three attempts at a part counted as three failures: a hole"),
     ];
     for (seed, what) in once {

@@ -67,11 +67,10 @@ impl Job {
             _ => {}
         }
         let Some(node) = nodes.get(&id) else { return };
-        let hanging = node.hanging.iter().filter(|(job, _)| *job == self.id).map(|(_, lease)| *lease);
-        for lease in node.held_of(self.id).chain(hanging) {
-            let Some(of) = self.leases.get(&lease) else { continue };
+        // Stray attempts too: they may be taken back, and then nobody would notice that the node knows nothing of them.
+        for (lease, of) in self.leases.iter().filter(|(_, of)| of.node == id) {
             let (rect, samples) = (self.part(of.part).rect, self.all_samples());
-            turn.send(id, node, ToNode::Render { job: self.id, lease, rect, samples });
+            turn.send(id, node, ToNode::Render { job: self.id, lease: *lease, rect, samples });
         }
     }
 

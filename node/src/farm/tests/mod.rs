@@ -214,15 +214,21 @@ fn a_goodbye_redistributes_at_once() {
     assert_eq!(bench.farm.nodes()[1].queued + bench.farm.nodes()[1].holds, 16);
 }
 
+/// Orders of attempts that count, and of those that do not any more because their lane seems to hang.
 #[test]
 fn orders_are_repeated_when_a_connection_is_renewed() {
-    let mut bench = Bench::new(1, Assign::Paper);
-    let held = bench.leases(0);
-    let info = NodeInfo { name: "n0".into(), lanes: 1, build: "b".into(), address: "elsewhere".into() };
-    bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info });
-    let again = |command: &Command| matches!(command, Command::Send { message: ToNode::Render { lease, .. }, .. } if held.contains(lease));
-    assert_eq!(bench.said.iter().filter(|command| again(command)).count(), 2);
-    assert_eq!(bench.count(EventKind::Lost), 0);
+    for (seconds, overdue) in [(0.0, 0), (60.0, 1)] {
+        let mut bench = Bench::new(1, Assign::Paper);
+        bench.passes(seconds, &[0]);
+        assert_eq!(bench.count(EventKind::Overdue), overdue);
+        let open = bench.leases(0);
+        let info = NodeInfo { name: "n0".into(), lanes: 1, build: "b".into(), address: "elsewhere".into() };
+        bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info });
+        let again =
+            |command: &Command| matches!(command, Command::Send { message: ToNode::Render { lease, .. }, .. } if open.contains(lease));
+        assert_eq!(bench.said.iter().filter(|command| again(command)).count(), 2);
+        assert_eq!(bench.count(EventKind::Lost), 0);
+    }
 }
 
 /// Two nodes are asked for, the prepared one dies while the other one still compiles: nothing is due before that one answers.
