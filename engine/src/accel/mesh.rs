@@ -41,18 +41,18 @@ pub struct MeshHit {
 }
 
 /// A tree over triangles or, where that is cheaper, over parts of triangles.
-struct Plan {
+struct Cheapest {
     tree: Collapse,
     /// The triangle of each part; none where triangles are whole.
     triangles: Vec<u32>,
 }
 
-impl Plan {
-    fn best(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let plan = Self { tree: Tree::plan(whole, LEAVES), triangles: Vec::new() };
-        let Some(References { boxes, triangles }) = split(whole, vertices) else { return plan };
+impl Cheapest {
+    fn of(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3]) -> Self {
+        let plain = Self { tree: Tree::plan(whole, LEAVES), triangles: Vec::new() };
+        let Some(References { boxes, triangles }) = split(whole, vertices) else { return plain };
         let parts = Self { tree: Tree::plan(&boxes, LEAVES), triangles };
-        if parts.tree.cost() < plan.tree.cost() { parts } else { plan }
+        if parts.tree.cost() < plain.tree.cost() { parts } else { plain }
     }
 }
 
@@ -69,22 +69,28 @@ impl MeshTree {
         positions.iter_mut().zip(&scaled).for_each(|(p, scaled)| *p = frame.unscaled(scaled.as_dvec3()).as_vec3().into());
         let vertices = |triangle: u32| triangles[triangle as usize].map(|i| scaled[i as usize]);
         let boxes: Vec<Box3> = (0..triangles.len() as u32).map(|triangle| Box3::of(vertices(triangle))).collect();
-        let references = Plan::best(&boxes, vertices);
+        let cheapest = Cheapest::of(&boxes, vertices);
         let mut packs = Vec::new();
-        let tree = Tree::carry_out(frame, references.tree, |leaf| {
-            let mut leaf: Vec<u32> = leaf.iter().map(|&part| references.triangles.get(part as usize).copied().unwrap_or(part)).collect();
+        let tree = Tree::carry_out(frame, cheapest.tree, |leaf| {
+            let mut leaf: Vec<u32> = leaf.iter().map(|&part| cheapest.triangles.get(part as usize).copied().unwrap_or(part)).collect();
             leaf.sort_unstable();
             leaf.dedup();
             packs.push(Pack::new(leaf.iter().map(|&triangle| (triangle, vertices(triangle)))));
             packs.len() as u32 - 1
         });
         let bounds = Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
-        Self { tree, packs: settle(packs), is_split: !references.triangles.is_empty(), positions, triangles, bounds }
+        Self { tree, packs: settle(packs), is_split: !cheapest.triangles.is_empty(), positions, triangles, bounds }
     }
 
     /// Number of triangles.
     pub fn count(&self) -> usize {
         self.triangles.len()
+    }
+
+    /// Whether a triangle may lie in several leaves.
+    #[cfg(test)]
+    pub fn is_split(&self) -> bool {
+        self.is_split
     }
 
     /// The box around it.

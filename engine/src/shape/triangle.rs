@@ -54,12 +54,6 @@ impl Sheared {
         self.axes
     }
 
-    /// The start, in the ray's own axes.
-    #[inline(always)]
-    pub fn origin(&self) -> [f64; 3] {
-        self.origin
-    }
-
     /// How far the first and the second axis lean along the last.
     #[inline(always)]
     pub fn shear(&self) -> [f64; 2] {

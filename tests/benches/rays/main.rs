@@ -24,7 +24,7 @@ use sets::{Query, Set};
 /// Rays that a contender traces before it is the next one's turn.
 const CHUNK: usize = 1 << 14;
 
-const TURNS: usize = 5;
+const TURNS: usize = 7;
 
 /// Distances that differ by less, in proportion, are taken for the same: Embree computes in f32.
 const SAME: f64 = 1e-3;

@@ -97,6 +97,59 @@ fn rays_along_the_axes_are_hit_as_without_a_tree() {
     check(&mut scene, &rays);
 }
 
+/// Long thin triangles, a stack of them and others at all angles, among many small ones: their boxes are nearly empty, so that the tree holds parts of
+/// them. Rays aim at their edges and through the stack too.
+fn slivers() -> (Scene, Vec<Ray>) {
+    let (mut random, mut mesh, mut rays) = (Random(21), MeshData::default(), Vec::new());
+    let mut add = |corners: [DVec3; 3]| {
+        let first = mesh.positions.len() as u32;
+        mesh.positions.extend(corners.map(|p| p.as_vec3().to_array()));
+        mesh.triangles.push([first, first + 1, first + 2]);
+    };
+    for height in 0..20 {
+        add([[-1.0, -1.0], [1.0, 1.0], [0.02, -0.02]].map(|[x, y]| DVec3::new(x, y, f64::from(height) * 0.1 - 1.0)));
+    }
+    for triangle in 0..4_000 {
+        let (from, along) = (random.point(), random.direction() * if triangle < 400 { 2.0 } else { 0.01 });
+        add([from, from + along, from + along * 0.5 + along.cross(random.direction()) * 0.005]);
+        let (aim, origin) = (from.as_vec3().as_dvec3().lerp((from + along).as_vec3().as_dvec3(), random.unit()), random.point() * 4.0);
+        rays.push(Ray::new(origin, (aim - origin).normalize()));
+        rays.push(Ray::new(DVec3::new(0.005, -0.005, 4.0) + random.point() * 0.01, -DVec3::Z));
+    }
+    let mut maker = Maker::default();
+    maker.mesh(&mesh, DAffine3::IDENTITY);
+    let scene = maker.compile();
+    assert!(scene.geometry.meshes[0].tree.is_split());
+    rays.extend(rays_of(&scene, 1_000));
+    (scene, rays)
+}
+
+#[test]
+fn split_triangles_are_hit_as_without_a_tree() {
+    let (mut scene, rays) = slivers();
+    check(&mut scene, &rays);
+}
+
+/// However many leaves hold a part of it, and also where a ray goes through many.
+#[test]
+fn a_split_triangle_is_crossed_once() {
+    let (scene, rays) = slivers();
+    let mesh = &scene.geometry.meshes[0].tree;
+    let mut most = 0;
+    for ray in &rays {
+        let sheared = Sheared::new(ray.origin, ray.direction);
+        let hits = (0..mesh.count() as u32).filter(|&triangle| sheared.hit(sheared.turned(mesh.vertices(triangle))).is_some()).count();
+        let mut crossings = 0;
+        assert!(!scene.any(ray, |_, _| {
+            crossings += 1;
+            false
+        }));
+        assert_eq!(crossings, hits, "{ray:?}");
+        most = most.max(hits);
+    }
+    assert!(most > 8, "{most}");
+}
+
 /// From a thousand to 10^12 scene sizes away.
 #[test]
 fn distant_rays_are_hit_as_without_a_tree() {
