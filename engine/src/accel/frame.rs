@@ -87,40 +87,82 @@ impl Normalisation {
         length * self.unscale
     }
 
+    /// The factor that [`Self::point`] and [`Self::length`] apply.
+    #[inline(always)]
+    pub fn scale(&self) -> f64 {
+        self.scale
+    }
+
     /// A ray in normalised coordinates. `direction` has any length but 0.
     #[inline(always)]
     pub fn ray<const UNIT_LENGTH: bool>(&self, origin: DVec3, direction: DVec3) -> BoxRay {
-        /// Components of the direction below this are raised to it: over the distances that matter the change stays far below `OUTWARD`.
-        const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
-        const SLACK: f32 = 1.0 / (1 << 21) as f32;
-        let unit = if UNIT_LENGTH { 1.0 } else { inverse_power_of_two(max_abs(direction)) };
-        let mut p = self.point(origin);
-        let d = direction * unit;
-        let mut start = 0.0;
+        let (size, unit) = if UNIT_LENGTH { (1.0, 1.0) } else { powers_of_two(max_abs(direction)) };
+        let (p, d) = (self.point(origin), direction * unit);
         let distance = max_abs(p);
-        if distance > FAR {
-            // No component can come to within 1 of the centre sooner than this.
-            start = (distance - 2.0) / max_abs(d);
-            p += d * start;
-        }
+        let (p, start) = if distance > FAR {
+            let start = new_start(distance, max_abs(d));
+            (p + d * start, start)
+        } else {
+            (p, 0.0)
+        };
         let (origin, direction) = (p.as_vec3a(), d.as_vec3a());
-        let size = origin.abs().max_element();
-        let error = (start * START_ERROR) as f32;
-        // From so far away that boxes cannot tell what it meets, it enters and leaves all of them at once.
-        let (shrunk, grown) = if error > NEARLY { (0.0, 0.0) } else { (1.0 - SLACK, 1.0 + SLACK) };
+        let error = error_of(start);
         let inverse = (Vec3A::ONE / direction.abs().max(Vec3A::splat(SMALLEST))).copysign(direction);
+        let (shrunk, grown) = slack(error);
         BoxRay {
             origin,
             direction,
             inverse_near: inverse * shrunk,
             inverse_far: inverse * grown,
             negative: direction.is_negative_bitmask(),
-            size,
+            size: origin.abs().max_element(),
             error,
-            ratio: self.scale / unit,
+            ratio: self.scale * size,
             start,
         }
     }
+}
+
+/// Components of a direction below this are raised to it: over the distances that matter the change stays far below `OUTWARD`.
+pub const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
+
+/// Where a ray starts anew whose origin's largest component is `distance`, and its direction's `largest`: no component can come to within 1 of the
+/// centre sooner than this. 0 for a ray that need not.
+#[inline(always)]
+pub fn new_start(distance: f64, largest: f64) -> f64 {
+    if distance > FAR { (distance - 2.0) / largest } else { 0.0 }
+}
+
+/// Bound on what a ray is wrong by that started anew.
+#[inline(always)]
+pub fn error_of(start: f64) -> f32 {
+    (start * START_ERROR) as f32
+}
+
+/// Factors for reciprocals at near and at far bounds.
+#[inline(always)]
+pub fn slack(error: f32) -> (f32, f32) {
+    const SLACK: f32 = 1.0 / (1 << 21) as f32;
+    // From so far away that boxes cannot tell what it meets, it enters and leaves all of them at once.
+    if error > NEARLY { (0.0, 0.0) } else { (1.0 - SLACK, 1.0 + SLACK) }
+}
+
+/// See [`BoxRay::magnitude`].
+#[inline(always)]
+pub fn magnitude(size: f32, error: f32, unit: f32) -> f32 {
+    1.0 + size + error * (1.0 / unit)
+}
+
+/// See [`BoxRay::is_sound`]; `direction` is the sum of its components.
+#[inline(always)]
+pub fn is_sound(size: f32, error: f32, direction: f32) -> bool {
+    (magnitude(size, error, FINEST) + direction).is_finite() & ((size <= 1.125 * FAR as f32) | (error > NEARLY))
+}
+
+/// See [`BoxRay::limit`].
+#[inline(always)]
+pub fn limit(t: f64, ratio: f64, start: f64) -> f32 {
+    (t * ratio - start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + error_of(start)
 }
 
 impl BoxRay {
@@ -129,26 +171,27 @@ impl BoxRay {
     /// others, not more than 3 later.
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
-        (self.magnitude(FINEST) + self.direction.element_sum()).is_finite() && (self.size <= 1.125 * FAR as f32 || self.error > NEARLY)
+        is_sound(self.size, self.error, self.direction.element_sum())
     }
 
     /// 1 + |origin|, and as much as covers the ray's own error for a filter that allows for errors of this times `unit`.
     #[inline(always)]
     pub fn magnitude(&self, unit: f32) -> f32 {
-        1.0 + self.size + self.error * (1.0 / unit)
+        magnitude(self.size, self.error, unit)
     }
 
     /// A parameter of the original ray as a limit for boxes, rounded up.
     #[inline(always)]
     pub fn limit(&self, t: f64) -> f32 {
-        (t * self.ratio - self.start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + (self.start * START_ERROR) as f32
+        limit(t, self.ratio, self.start)
     }
 }
 
-/// A power of two that takes a positive number to between 1 and 2, or as near as powers of two go.
+/// The largest power of two that is not above a positive number, or as near as numbers go whose reciprocal is normal, and that reciprocal.
 #[inline(always)]
-fn inverse_power_of_two(x: f64) -> f64 {
-    f64::from_bits((0x7fe0_0000_0000_0000_u64).saturating_sub(x.to_bits() & 0x7ff0_0000_0000_0000).max(1 << 52))
+pub fn powers_of_two(x: f64) -> (f64, f64) {
+    let exponent = (x.to_bits() & 0x7ff0_0000_0000_0000).clamp(1 << 52, 2045 << 52);
+    (f64::from_bits(exponent), f64::from_bits(0x7fe0_0000_0000_0000 - exponent))
 }
 
 /// The largest power of two that is not above a positive normal number.

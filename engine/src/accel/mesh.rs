@@ -22,10 +22,10 @@ use crate::shape::{
 /// Triangles and the tree over them, in the mesh's own coordinates.
 #[derive(Debug)]
 pub struct MeshTree {
-    tree: Tree,
-    packs: Vec<Pack>,
+    pub(super) tree: Tree,
+    pub(super) packs: Vec<Pack>,
     /// Whether a triangle may lie in several packs.
-    is_split: bool,
+    pub(super) is_split: bool,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     bounds: Bounds,
@@ -167,7 +167,7 @@ impl MeshTree {
 
 /// The triangles that a ray has been told of.
 #[derive(Default)]
-struct Told {
+pub(super) struct Told {
     first: [u32; 8],
     count: usize,
     /// What the first places cannot hold: few rays go through so many surfaces and on.
@@ -175,8 +175,16 @@ struct Told {
 }
 
 impl Told {
+    /// Forgets all.
     #[inline(always)]
-    fn is_new(&mut self, triangle: u32) -> bool {
+    pub fn clear(&mut self) {
+        self.count = 0;
+        self.more.clear();
+    }
+
+    /// Notes a triangle; whether it was not known.
+    #[inline(always)]
+    pub fn is_new(&mut self, triangle: u32) -> bool {
         let known = self.first.iter().take(self.count).chain(&self.more).any(|&other| other == triangle);
         if !known {
             match self.first.get_mut(self.count) {

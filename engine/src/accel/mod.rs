@@ -7,21 +7,27 @@
 //! where, is decided in f64 alone (`shape`). So hits depend neither on the tree nor on the vector width, and equal distances are told
 //! apart by the objects' order.
 
+mod block;
 mod build;
 mod collapse;
 mod frame;
+mod interleave;
 mod median;
 mod mesh;
 mod node;
 mod pack;
+mod packet;
 mod pages;
 mod pencil;
+mod pending;
 mod simd;
 mod spheres;
 mod split;
+mod stream;
 mod traverse;
 mod tree;
 
+pub use block::SIZE as BLOCK;
 pub use collapse::LeafRule;
 pub use mesh::{MeshHit, MeshTree};
 pub use pencil::Pencil;

@@ -1,6 +1,6 @@
 //! Eight triangles at a time: the conservative f32 filter before the exact test, and what that test reads.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use super::{
     frame::{BoxRay, FINEST},
@@ -12,30 +12,51 @@ use crate::{
 };
 
 /// A ray as the filter sees it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PackRay {
-    /// The ray's own axes, in which everything else is given.
-    axes: [usize; 3],
+    /// The ray's own axes, in which everything else is given: where their coordinates stand beside those of the first axis, in bytes.
+    axes: [u32; 3],
     origin: [f32; 3],
     shear: [f32; 2],
     /// Slack is `(extent + near) * slack`.
     near: f32,
     slack: f32,
+    /// Has the sign of the direction along the last axis.
+    forward: f32,
+}
+
+/// Bytes of one coordinate of eight points.
+const AXIS: usize = size_of::<[f32; 8]>();
+
+/// One coordinate of eight points.
+///
+/// # Safety
+/// `axis` is a multiple of `AXIS`, below 3 of them. The processor has the instructions of `L`.
+#[inline(always)]
+unsafe fn along<L: Lanes>(points: &[[f32; 8]; 3], axis: u32) -> L {
+    // SAFETY: by this function's own condition.
+    unsafe { L::load(&*points.as_ptr().byte_add(axis as usize)) }
 }
 
 impl PackRay {
     /// The same ray twice.
     #[inline(always)]
     pub fn new(ray: &BoxRay, sheared: &Sheared) -> Self {
-        let (magnitude, origin) = (ray.magnitude(FINEST), ray.origin.to_array());
-        let [x, y, z] = sheared.axes();
-        let [sx, sy] = sheared.shear();
+        let ([x, y, z], origin) = (sheared.axes(), ray.origin.to_array());
+        let shear = sheared.shear().map(|s| s as f32);
+        Self::of([x, y, z], [origin[x], origin[y], origin[z]], shear, ray.magnitude(FINEST), sheared.is_backward())
+    }
+
+    /// From its axes; origin and shear in these; the ray's magnitude, see [`BoxRay::magnitude`]; and whether it goes backward along the last axis.
+    #[inline(always)]
+    pub fn of(axes: [usize; 3], origin: [f32; 3], shear: [f32; 2], magnitude: f32, is_backward: bool) -> Self {
         Self {
-            axes: [x, y, z],
-            origin: [origin[x], origin[y], origin[z]],
-            shear: [sx as f32, sy as f32],
+            axes: axes.map(|axis| (axis * AXIS) as u32),
+            origin,
+            shear,
             near: magnitude * (1.0 / (1 << 22) as f32),
             slack: magnitude * (1.0 / (1 << 17) as f32),
+            forward: if is_backward { -1.0 } else { 1.0 },
         }
     }
 
@@ -48,9 +69,9 @@ impl PackRay {
         let [x, y, z] = self.axes;
         // SAFETY: by this function's own condition; axes are below 3.
         unsafe {
-            let z = L::load(points.get_unchecked(z)).sub(L::splat(self.origin[2]));
-            let x = L::load(points.get_unchecked(x)).sub(L::splat(self.origin[0])).sub(z.mul(L::splat(self.shear[0])));
-            let y = L::load(points.get_unchecked(y)).sub(L::splat(self.origin[1])).sub(z.mul(L::splat(self.shear[1])));
+            let z = along::<L>(points, z).sub(L::splat(self.origin[2]));
+            let x = along::<L>(points, x).sub(L::splat(self.origin[0])).sub(z.mul(L::splat(self.shear[0])));
+            let y = along::<L>(points, y).sub(L::splat(self.origin[1])).sub(z.mul(L::splat(self.shear[1])));
             (x, y)
         }
     }
@@ -89,12 +110,29 @@ impl Pack {
         self.ids[slot]
     }
 
-    /// Where a ray hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
+    /// Where a ray in scaled coordinates hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
+    ///
+    /// # Safety
+    /// The place is below 8.
+    #[inline(never)]
+    pub unsafe fn hit_by(&self, slot: usize, origin: DVec3, direction: DVec3) -> Option<TriangleHit> {
+        let sheared = Sheared::new(origin, direction);
+        // SAFETY: by this function's own condition.
+        unsafe { self.hit_in(slot, &sheared) }
+    }
+
+    /// The same for a ray that is ready for it.
     ///
     /// # Safety
     /// The place is below 8.
     #[inline(never)]
     pub unsafe fn hit(&self, slot: usize, ray: &Sheared) -> Option<TriangleHit> {
+        // SAFETY: by this function's own condition.
+        unsafe { self.hit_in(slot, ray) }
+    }
+
+    #[inline(always)]
+    unsafe fn hit_in(&self, slot: usize, ray: &Sheared) -> Option<TriangleHit> {
         let [x, y, z] = ray.axes();
         // SAFETY: by this function's own condition; axes are below 3.
         let at = |vertex: &[[f32; 8]; 3], axis: usize| unsafe { f64::from(*vertex.get_unchecked(axis).get_unchecked(slot)) };
@@ -124,7 +162,38 @@ impl Pack {
             let (lowest, highest) = (u.min(v).min(w), u.max(v).max(w));
             let slack = L::load(&self.extent).add(L::splat(ray.near)).mul(L::splat(ray.slack));
             let zero = L::splat(0.0);
-            zero.le(lowest.max(zero.sub(highest)).add(slack))
+            let met = zero.le(lowest.max(zero.sub(highest)).add(slack));
+            if met == 0 { 0 } else { met & self.ahead::<L>(ray) }
+        }
+    }
+
+    /// Bit i is set unless the ray certainly meets the plane of triangle i behind its start: rays that leave a surface always pass near what they left.
+    ///
+    /// Signs of products of the normal n = p x q decide, with p and q edges from vertex a. With u, E and M as in [`Self::candidates`]: p and q are wrong by u E, a component of n
+    /// by 8 u E^2 and at most 2 E^2 itself, and a minus the origin by 2 u M and at most M itself, so that its product with n is wrong by up to
+    /// 3 M 8 u E^2 + 3 (2 E^2) 2 u M + 18 u M E^2 = 54 u M E^2, and n's product with the direction in proportion to its largest component by less. The error allowed for
+    /// is 64 u M E^2.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn ahead<L: Lanes>(&self, ray: &PackRay) -> u32 {
+        // SAFETY: by this function's own condition; axes are below 3.
+        unsafe {
+            let [a, b, c] = &self.vertices;
+            let [i, j, k] = ray.axes;
+            let (ax, ay, az) = (along::<L>(a, i), along::<L>(a, j), along::<L>(a, k));
+            let (px, py, pz) = (along::<L>(b, i).sub(ax), along::<L>(b, j).sub(ay), along::<L>(b, k).sub(az));
+            let (qx, qy, qz) = (along::<L>(c, i).sub(ax), along::<L>(c, j).sub(ay), along::<L>(c, k).sub(az));
+            let x = py.mul(qz).sub(pz.mul(qy));
+            let y = pz.mul(qx).sub(px.mul(qz));
+            let z = px.mul(qy).sub(py.mul(qx));
+            let (ax, ay, az) = (ax.sub(L::splat(ray.origin[0])), ay.sub(L::splat(ray.origin[1])), az.sub(L::splat(ray.origin[2])));
+            let approach = z.add(x.mul(L::splat(ray.shear[0]))).add(y.mul(L::splat(ray.shear[1])));
+            let distance = ax.mul(x).add(ay.mul(y)).add(az.mul(z)).signed(approach).signed(L::splat(ray.forward));
+            let extent = L::load(&self.extent);
+            let error = extent.mul(extent).mul(L::splat(ray.slack * 0.5));
+            L::splat(0.0).le(distance.add(error)) | approach.abs().le(error)
         }
     }
 }

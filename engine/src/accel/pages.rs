@@ -25,3 +25,16 @@ fn ask_for_large_pages<T>(memory: &mut Vec<T>) {
 
 #[cfg(not(target_os = "linux"))]
 fn ask_for_large_pages<T>(_: &mut Vec<T>) {}
+
+/// Asks memory for the four lines of the processor's cache that begin with `at`, which need not be there.
+#[inline(always)]
+pub fn prefetch(at: *const u8) {
+    #[cfg(target_arch = "x86_64")]
+    for line in 0..4 {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: it reads nothing.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = at;
+}

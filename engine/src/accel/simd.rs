@@ -34,15 +34,38 @@ pub(crate) trait Lanes: Copy {
     unsafe fn min(self, o: Self) -> Self;
     unsafe fn max(self, o: Self) -> Self;
     unsafe fn abs(self) -> Self;
+    /// With the sign turned where `o` has one.
+    unsafe fn signed(self, o: Self) -> Self;
     /// Bit i is set where `self[i] <= o[i]`.
     unsafe fn le(self, o: Self) -> u32;
+    /// Eight distances, each cut to the upper half of its bits: they order as the distances do, but for some that are nearly the same.
+    type Keys: Copy;
+    /// Of all `self[i]` that are not above `o[i]`; all bits are set for the others.
+    unsafe fn keys(self, o: Self) -> Self::Keys;
+    /// The least key and its place, below 8.
+    unsafe fn least(keys: Self::Keys) -> (u32, usize);
+    /// The keys but for that of one place, below 8.
+    unsafe fn without(keys: Self::Keys, place: usize) -> Self::Keys;
+    /// Whether no key is left.
+    unsafe fn is_empty(keys: Self::Keys) -> bool;
 }
+
+/// `TAKEN[i]` has all bits of place i.
+const TAKEN: [[u16; 8]; 8] = {
+    let mut taken = [[0; 8]; 8];
+    let mut i = 0;
+    while i < 8 {
+        taken[i][i] = 0xffff;
+        i += 1;
+    }
+    taken
+};
 
 #[cfg(target_arch = "x86_64")]
 // One argument holds for all functions of a type, and stands there.
 #[allow(clippy::undocumented_unsafe_blocks)]
 mod x86 {
-    use super::Lanes;
+    use super::{Lanes, TAKEN};
     use std::arch::x86_64::*;
 
     // SAFETY of all functions: the caller enables AVX2, as the trait demands; loads and stores stay within their arrays.
@@ -59,8 +82,21 @@ mod x86 {
         #[inline(always)] unsafe fn mul(self, o: Self) -> Self { unsafe { Self(_mm256_mul_ps(self.0, o.0)) } }
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { unsafe { Self(_mm256_min_ps(self.0, o.0)) } }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { unsafe { Self(_mm256_max_ps(self.0, o.0)) } }
+        #[inline(always)] unsafe fn signed(self, o: Self) -> Self { unsafe { Self(_mm256_xor_ps(self.0, _mm256_and_ps(_mm256_set1_ps(-0.0), o.0))) } }
         #[inline(always)] unsafe fn abs(self) -> Self { unsafe { Self(_mm256_andnot_ps(_mm256_set1_ps(-0.0), self.0)) } }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { unsafe { _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(self.0, o.0)) as u32 } }
+        type Keys = __m128i;
+        #[inline(always)] unsafe fn keys(self, o: Self) -> __m128i { unsafe {
+            let all = _mm256_castps_si256(_mm256_or_ps(self.0, _mm256_cmp_ps::<_CMP_NLE_UQ>(self.0, o.0)));
+            let upper = _mm256_srli_epi32::<16>(all);
+            _mm_packus_epi32(_mm256_castsi256_si128(upper), _mm256_extracti128_si256::<1>(upper))
+        } }
+        #[inline(always)] unsafe fn least(keys: __m128i) -> (u32, usize) { unsafe {
+            let found = _mm_cvtsi128_si32(_mm_minpos_epu16(keys)) as u32;
+            (found & 0xffff, (found >> 16) as usize)
+        } }
+        #[inline(always)] unsafe fn without(keys: __m128i, place: usize) -> __m128i { unsafe { _mm_or_si128(keys, _mm_loadu_si128(TAKEN.as_ptr().add(place).cast())) } }
+        #[inline(always)] unsafe fn is_empty(keys: __m128i) -> bool { unsafe { _mm_test_all_ones(keys) != 0 } }
     }
 
     // SAFETY of all functions: SSE2 is part of x86_64; loads and stores stay within their arrays.
@@ -77,8 +113,26 @@ mod x86 {
         #[inline(always)] unsafe fn mul(self, o: Self) -> Self { unsafe { Self(_mm_mul_ps(self.0, o.0), _mm_mul_ps(self.1, o.1)) } }
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { unsafe { Self(_mm_min_ps(self.0, o.0), _mm_min_ps(self.1, o.1)) } }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { unsafe { Self(_mm_max_ps(self.0, o.0), _mm_max_ps(self.1, o.1)) } }
+        #[inline(always)] unsafe fn signed(self, o: Self) -> Self { unsafe { let s = _mm_set1_ps(-0.0); Self(_mm_xor_ps(self.0, _mm_and_ps(s, o.0)), _mm_xor_ps(self.1, _mm_and_ps(s, o.1))) } }
         #[inline(always)] unsafe fn abs(self) -> Self { unsafe { let s = _mm_set1_ps(-0.0); Self(_mm_andnot_ps(s, self.0), _mm_andnot_ps(s, self.1)) } }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { unsafe { (_mm_movemask_ps(_mm_cmple_ps(self.0, o.0)) | _mm_movemask_ps(_mm_cmple_ps(self.1, o.1)) << 4) as u32 } }
+        type Keys = __m128i;
+        #[inline(always)] unsafe fn keys(self, o: Self) -> __m128i { unsafe {
+            let half = |a: __m128, b: __m128| _mm_srai_epi32::<16>(_mm_castps_si128(_mm_or_ps(a, _mm_cmpnle_ps(a, b))));
+            _mm_packs_epi32(half(self.0, o.0), half(self.1, o.1))
+        } }
+        #[inline(always)] unsafe fn least(keys: __m128i) -> (u32, usize) { unsafe {
+            // Distances are not negative: with their sign, keys that are taken would come first, and so lose it here.
+            let low = _mm_andnot_si128(_mm_set1_epi16(i16::MIN), keys);
+            let m = _mm_min_epi16(low, _mm_shuffle_epi32::<0b01_00_11_10>(low));
+            let m = _mm_min_epi16(m, _mm_shuffle_epi32::<0b10_11_00_01>(m));
+            let m = _mm_min_epi16(m, _mm_or_si128(_mm_srli_epi32::<16>(m), _mm_slli_epi32::<16>(m)));
+            let place = (_mm_movemask_epi8(_mm_cmpeq_epi16(low, m)) as u32).trailing_zeros() as usize / 2;
+            let key = _mm_cvtsi128_si32(m) as u32 & 0x7fff;
+            (if key == 0x7fff { 0xffff } else { key }, place)
+        } }
+        #[inline(always)] unsafe fn without(keys: __m128i, place: usize) -> __m128i { unsafe { _mm_or_si128(keys, _mm_loadu_si128(TAKEN.as_ptr().add(place).cast())) } }
+        #[inline(always)] unsafe fn is_empty(keys: __m128i) -> bool { unsafe { _mm_movemask_epi8(_mm_cmpeq_epi16(keys, _mm_set1_epi16(-1))) == 0xffff } }
     }
 }
 

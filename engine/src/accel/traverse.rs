@@ -4,7 +4,7 @@ use std::{mem::MaybeUninit, ops::ControlFlow};
 
 use super::{
     frame::BoxRay,
-    node::{BOUND, LEAF, Node},
+    node::{LEAF, Node, near_bounds},
     simd::Lanes,
 };
 
@@ -32,14 +32,10 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     }
     // SAFETY: by this function's own conditions.
     unsafe {
-        let (ox, oy, oz) = (L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z));
-        let (nx, ny, nz) = (L::splat(ray.inverse_near.x), L::splat(ray.inverse_near.y), L::splat(ray.inverse_near.z));
-        let (fx, fy, fz) = (L::splat(ray.inverse_far.x), L::splat(ray.inverse_far.y), L::splat(ray.inverse_far.z));
-        // In bytes, so that nothing is multiplied on the way.
-        let near_bound = |axis: u32| BOUND * (axis as usize + if ray.negative >> axis & 1 == 1 { 3 } else { 0 });
-        let (near_x, near_y, near_z) = (near_bound(0), near_bound(1), near_bound(2));
-        let (far_x, far_y, far_z) = (3 * BOUND - near_x, 5 * BOUND - near_y, 7 * BOUND - near_z);
-        let zero = L::splat(0.0);
+        let origin = [L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z)];
+        let inverse_near = [L::splat(ray.inverse_near.x), L::splat(ray.inverse_near.y), L::splat(ray.inverse_near.z)];
+        let inverse_far = [L::splat(ray.inverse_far.x), L::splat(ray.inverse_far.y), L::splat(ray.inverse_far.z)];
+        let near = near_bounds(ray.negative);
         let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
         let stack = stack.as_mut_ptr().cast::<u64>();
         let mut height = 0usize;
@@ -48,12 +44,7 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
         loop {
             if current & LEAF == 0 {
                 let node = nodes.get_unchecked(current as usize);
-                let (enter_x, leave_x) = (node.distance(near_x, ox, nx), node.distance(far_x, ox, fx));
-                let (enter_y, leave_y) = (node.distance(near_y, oy, ny), node.distance(far_y, oy, fy));
-                let (enter_z, leave_z) = (node.distance(near_z, oz, nz), node.distance(far_z, oz, fz));
-                // Of two of which one is no number, `max` takes the second: an empty place then has no number to enter at.
-                let enter = enter_x.max(enter_y).max(zero.max(enter_z));
-                let leave = leave_x.min(leave_y).min(leave_z.min(L::splat(limit)));
+                let (enter, leave) = node.meet(near, [origin, inverse_near], [origin, inverse_far], L::splat(limit));
                 let mut hits = enter.le(leave);
                 if hits != 0 {
                     let first = hits.trailing_zeros() as usize;

@@ -52,6 +52,11 @@ impl Tree {
         &self.frame
     }
 
+    /// Nodes and root.
+    pub fn parts(&self) -> (&[Node], u32) {
+        (&self.nodes, self.root)
+    }
+
     /// What visits would be given, where there is nothing but one leaf.
     #[inline(always)]
     pub fn only_leaf(&self) -> Option<u32> {

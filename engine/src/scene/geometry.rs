@@ -6,7 +6,7 @@ use crate::{
     accel::{LeafRule, MOST_LISTED_SPHERES, MeshHit, MeshTree, Pencil, Simd, SphereList, Tree},
     light::Light,
     math::{UNIT, max_abs},
-    shape::{Bounds, Cuboid, Disc, Plane, Sphere, triangle::geometric_normal},
+    shape::{Bounds, Cuboid, Disc, Plane, Ray, Sphere, triangle::geometric_normal},
 };
 
 /// A shape in world coordinates.
@@ -23,6 +23,7 @@ pub struct Placed<S> {
 pub struct Transform {
     pub to_world: DAffine3,
     pub to_object: DAffine3,
+    is_identity: bool,
     /// Largest factor by which a vector's largest component grows on the way to the world, and back.
     growth_to_world: f64,
     growth_to_object: f64,
@@ -144,7 +145,13 @@ impl Transform {
         let growth = |m: DMat3| max_abs(m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs());
         let (growth_to_world, growth_to_object) = (growth(to_world.matrix3), growth(to_object.matrix3));
         let usable = to_world.is_finite() && to_object.is_finite() && growth_to_world > 0.0 && growth_to_object > 0.0;
-        usable.then_some(Self { to_world, to_object, growth_to_world, growth_to_object })
+        usable.then_some(Self { to_world, to_object, is_identity: to_world == DAffine3::IDENTITY, growth_to_world, growth_to_object })
+    }
+
+    /// A ray in the object's coordinates, where there are no listed spheres; `t` keeps its meaning.
+    #[inline(always)]
+    pub fn of_ray(&self, ray: &Ray) -> Ray {
+        if self.is_identity { Ray { leaves: 0, ..*ray } } else { ray.transformed(&self.to_object) }
     }
 
     /// The box around the image of a box.

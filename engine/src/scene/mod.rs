@@ -6,6 +6,7 @@ mod geometry;
 mod place;
 mod query;
 mod statistics;
+mod stream;
 mod surface;
 mod tracer;
 #[cfg(test)]

@@ -37,6 +37,18 @@ pub struct Hit {
 const NONE: u32 = u32::MAX;
 
 impl Hit {
+    /// Where a ray of this `t_max` has met nothing: no object is below 0, so that a hit at `t_max` is none.
+    #[inline(always)]
+    pub(super) fn none(t_max: f64) -> Self {
+        Self { t: t_max, object: 0, part: 0, reference: NONE, b1: 0.0, b2: 0.0 }
+    }
+
+    /// Of a triangle.
+    #[inline(always)]
+    pub(super) fn of_mesh(hit: &MeshHit, object: u32, reference: u32) -> Self {
+        Self { t: hit.at.t, object, part: hit.triangle, reference, b1: hit.at.b1, b2: hit.at.b2 }
+    }
+
     /// `None` for the hit of nothing.
     #[inline(always)]
     pub(super) fn some(self) -> Option<Self> {
@@ -45,7 +57,7 @@ impl Hit {
 
     /// Takes over a hit that is nearer, or as near and of an earlier object.
     #[inline(always)]
-    fn offer(&mut self, hit: Hit) {
+    pub(super) fn offer(&mut self, hit: Hit) {
         if hit.t < self.t || (hit.t == self.t && (hit.object, hit.part) < (self.object, self.part)) {
             *self = hit;
         }
@@ -129,6 +141,12 @@ impl Scene {
         self.run(Any(ray, blocks))
     }
 
+    /// The reference of a mesh that is all there is in the tree.
+    #[inline(always)]
+    pub(super) fn only_mesh(&self) -> Option<u32> {
+        self.geometry.tree.as_ref()?.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH)
+    }
+
     pub(super) fn simd(&self) -> Simd {
         self.geometry.simd
     }
@@ -167,10 +185,9 @@ impl Scene {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub(super) unsafe fn closest_in<L: Outlined>(&self, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
+    pub(super) unsafe fn closest_beside_tree<L: Lanes>(&self, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
         let geometry = &self.geometry;
-        // A hit at `t_max` is none: no object is below 0.
-        let mut best = Hit { t: ray.t_max, object: 0, part: 0, reference: NONE, b1: 0.0, b2: 0.0 };
+        let mut best = Hit::none(ray.t_max);
         for (index, plane) in geometry.planes.iter().enumerate() {
             if let Some(t) = plane.shape.closest(ray) {
                 best.offer(Hit {
@@ -198,8 +215,18 @@ impl Scene {
                 }
             }
         }
+        best
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn closest_in<L: Outlined>(&self, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
+        let geometry = &self.geometry;
+        // SAFETY: the caller has the instructions of `L`.
+        let mut best = unsafe { self.closest_beside_tree::<L>(ray, pencil) };
         let Some(tree) = &geometry.tree else { return best };
-        if let Some(reference) = tree.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH) {
+        if let Some(reference) = self.only_mesh() {
             // SAFETY: the caller has the instructions of `L`.
             unsafe { L::closest_of_mesh(self, ray, reference, &mut best) }
             return best;
@@ -230,7 +257,7 @@ impl Scene {
                 }
                 kind::TRANSFORMED => {
                     let placed = &geometry.transformed[index];
-                    let local = ray.transformed(&placed.shape.transform.to_object);
+                    let local = placed.shape.transform.of_ray(ray);
                     let hit = match &placed.shape.shape {
                         LocalShape::Sphere(sphere) => sphere.closest::<false>(&local).map(|t| (t, 0)),
                         LocalShape::Cuboid(cuboid) => cuboid.closest(&local),
@@ -255,14 +282,13 @@ impl Scene {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub(super) unsafe fn any_in<L: Outlined>(
+    pub(super) unsafe fn any_beside_tree<L: Lanes>(
         &self,
         ray: &Ray,
         light: Option<usize>,
-        mut blocks: impl FnMut(u32, &Crossing) -> bool,
+        blocked: &mut impl FnMut(u32, f64) -> bool,
     ) -> bool {
         let geometry = &self.geometry;
-        let mut blocked = |material: u32, t: f64| t > 0.0 && t < ray.t_max && blocks(material, &Crossing { t });
         if geometry.planes.iter().any(|plane| plane.shape.closest(ray).is_some_and(|t| blocked(plane.material, t))) {
             return true;
         }
@@ -281,8 +307,26 @@ impl Scene {
                 }
             }
         }
+        false
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn any_in<L: Outlined>(
+        &self,
+        ray: &Ray,
+        light: Option<usize>,
+        mut blocks: impl FnMut(u32, &Crossing) -> bool,
+    ) -> bool {
+        let geometry = &self.geometry;
+        let mut blocked = |material: u32, t: f64| t > 0.0 && t < ray.t_max && blocks(material, &Crossing { t });
+        // SAFETY: the caller has the instructions of `L`.
+        if unsafe { self.any_beside_tree::<L>(ray, light, &mut blocked) } {
+            return true;
+        }
         let Some(tree) = &geometry.tree else { return false };
-        if let Some(reference) = tree.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH) {
+        if let Some(reference) = self.only_mesh() {
             // SAFETY: the caller has the instructions of `L`.
             return unsafe { L::any_of_mesh(self, ray, reference, &mut blocked) };
         }
@@ -308,7 +352,7 @@ impl Scene {
                 }
                 kind::TRANSFORMED => {
                     let placed = &geometry.transformed[index];
-                    let local = ray.transformed(&placed.shape.transform.to_object);
+                    let local = placed.shape.transform.of_ray(ray);
                     let crossings = match &placed.shape.shape {
                         LocalShape::Sphere(sphere) => sphere.crossings::<false>(local.origin, local.direction),
                         LocalShape::Cuboid(cuboid) => cuboid.crossings(local.origin, local.direction).map(|[near, far]| [near.0, far.0]),
@@ -333,10 +377,10 @@ impl Scene {
     #[inline(always)]
     unsafe fn closest_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, best: &mut Hit) {
         let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
-        let local = Ray { t_max: best.t, ..ray.transformed(&placed.shape.transform.to_object) };
+        let local = Ray { t_max: best.t, ..placed.shape.transform.of_ray(ray) };
         let visit = |hit: MeshHit| {
             if !placed.shape.masked || self.is_there(placed, &hit) {
-                best.offer(Hit { t: hit.at.t, object: placed.object, part: hit.triangle, reference, b1: hit.at.b1, b2: hit.at.b2 });
+                best.offer(Hit::of_mesh(&hit, placed.object, reference));
             }
             ControlFlow::Continue(best.t)
         };
@@ -349,7 +393,7 @@ impl Scene {
     #[inline(always)]
     unsafe fn any_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
         let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
-        let local = ray.transformed(&placed.shape.transform.to_object);
+        let local = placed.shape.transform.of_ray(ray);
         let visit = |hit: MeshHit| {
             let there = !placed.shape.masked || self.is_there(placed, &hit);
             if there && blocked(placed.material, hit.at.t) { ControlFlow::Break(()) } else { ControlFlow::Continue(ray.t_max) }
@@ -360,7 +404,7 @@ impl Scene {
 
     /// Whether a mesh has a surface at a hit: not cut away by its alpha mask, nor seen from a back that it does not have.
     #[cold]
-    fn is_there(&self, placed: &Placed<Instance>, hit: &MeshHit) -> bool {
+    pub(super) fn is_there(&self, placed: &Placed<Instance>, hit: &MeshHit) -> bool {
         let material = &self.materials[placed.material as usize];
         if !material.double_sided && !hit.at.front {
             return false;

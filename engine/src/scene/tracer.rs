@@ -16,6 +16,13 @@ pub trait Tracer: Copy + Deref<Target = Scene> {
     /// The nearest hit of a ray of unit direction.
     fn hit(self, ray: &Ray) -> Option<Hit>;
 
+    /// The nearest hits of many rays, each given to `found` once with its number, in order: faster than one by one where the tree is large or rays that follow
+    /// one another, eight at a time, go the same way.
+    fn hits(self, rays: &[Ray], found: impl FnMut(usize, Option<Hit>));
+
+    /// [`Scene::any`] for many rays, each given to `found` once with its number, in order; `blocks` is given its number too.
+    fn any_of(self, rays: &[Ray], blocks: impl FnMut(usize, u32, &Crossing) -> bool, found: impl FnMut(usize, bool));
+
     /// See [`Scene::closest`].
     fn closest(self, ray: &Ray) -> Option<Surface>;
 
@@ -101,6 +108,24 @@ impl Tracer for View<'_, Avx2> {
     }
 
     #[inline(always)]
+    fn hits(self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) {
+        // SAFETY: `self` is the proof.
+        if !unsafe { self.scene.hits_in::<Avx2>(rays, &mut found) } {
+            rays.iter().enumerate().for_each(|(number, ray)| found(number, self.hit(ray)));
+        }
+    }
+
+    #[inline(always)]
+    fn any_of(self, rays: &[Ray], mut blocks: impl FnMut(usize, u32, &Crossing) -> bool, mut found: impl FnMut(usize, bool)) {
+        // SAFETY: `self` is the proof.
+        if !unsafe { self.scene.any_of_in::<Avx2>(rays, &mut blocks, &mut found) } {
+            for (number, ray) in rays.iter().enumerate() {
+                found(number, self.any(ray, |material, crossing| blocks(number, material, crossing)));
+            }
+        }
+    }
+
+    #[inline(always)]
     fn closest(self, ray: &Ray) -> Option<Surface> {
         // SAFETY: `self` is the proof.
         let hit = unsafe { self.scene.closest_avx2(ray) };
@@ -132,6 +157,24 @@ impl Tracer for View<'_, Baseline> {
     fn hit(self, ray: &Ray) -> Option<Hit> {
         // SAFETY: `self` is the proof.
         unsafe { self.scene.closest_in::<Baseline>(ray, None) }.some()
+    }
+
+    #[inline(always)]
+    fn hits(self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) {
+        // SAFETY: `self` is the proof.
+        if !unsafe { self.scene.hits_in::<Baseline>(rays, &mut found) } {
+            rays.iter().enumerate().for_each(|(number, ray)| found(number, self.hit(ray)));
+        }
+    }
+
+    #[inline(always)]
+    fn any_of(self, rays: &[Ray], mut blocks: impl FnMut(usize, u32, &Crossing) -> bool, mut found: impl FnMut(usize, bool)) {
+        // SAFETY: `self` is the proof.
+        if !unsafe { self.scene.any_of_in::<Baseline>(rays, &mut blocks, &mut found) } {
+            for (number, ray) in rays.iter().enumerate() {
+                found(number, self.any(ray, |material, crossing| blocks(number, material, crossing)));
+            }
+        }
     }
 
     #[inline(always)]

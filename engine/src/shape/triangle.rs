@@ -30,19 +30,26 @@ pub struct TriangleHit {
     pub front: bool,
 }
 
+/// A ray's own axes, by the last of them.
+pub const AXES: [[usize; 3]; 3] = [[1, 2, 0], [2, 0, 1], [0, 1, 2]];
+
+/// The axis along which a direction of these magnitudes goes most.
+#[inline(always)]
+pub fn last_axis([x, y, z]: [f64; 3]) -> usize {
+    if x > y {
+        if x > z { 0 } else { 2 }
+    } else if y > z {
+        1
+    } else {
+        2
+    }
+}
+
 impl Sheared {
     /// Prepares a ray whose direction is not 0.
     #[inline(always)]
     pub fn new(origin: DVec3, direction: DVec3) -> Self {
-        let size = direction.abs();
-        let z = if size.x > size.y {
-            if size.x > size.z { 0 } else { 2 }
-        } else if size.y > size.z {
-            1
-        } else {
-            2
-        };
-        let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][z];
+        let axes = AXES[last_axis(direction.abs().to_array())];
         let (origin, direction) = (turned(axes, origin), turned(axes, direction));
         let scale = 1.0 / direction[2];
         Self { axes, origin, direction, shear: [direction[0] * scale, direction[1] * scale, scale] }
@@ -58,6 +65,12 @@ impl Sheared {
     #[inline(always)]
     pub fn shear(&self) -> [f64; 2] {
         [self.shear[0], self.shear[1]]
+    }
+
+    /// Whether the direction is negative along the last axis.
+    #[inline(always)]
+    pub fn is_backward(&self) -> bool {
+        self.direction[2] < 0.0
     }
 
     /// A triangle in the ray's own axes.

@@ -89,7 +89,8 @@ fn compare(embree: &Embree, model: &Model, ratios: &mut Vec<f64>) {
         let mut contenders = vec![
             Contender::new("embree", |rays, out| fast.trace(rays, any, out)),
             Contender::new("robust", |rays, out| robust.trace(rays, any, out)),
-            Contender::new("tessera", |rays, out| trace(&scene, rays, any, out)),
+            Contender::new("single", |rays, out| trace(&scene, rays, any, out)),
+            Contender::new("stream", |rays, out| stream(&scene, rays, any, out)),
         ];
         if set.is_coherent {
             contenders.push(Contender::new("packets", |rays, out| fast.trace_packets(rays, out)));
@@ -98,7 +99,7 @@ fn compare(embree: &Embree, model: &Model, ratios: &mut Vec<f64>) {
     }
 }
 
-/// Lets contenders take turns; prints what came of it. Returns our speed in proportion to Embree's.
+/// Lets contenders take turns; prints what came of it. Returns the speed of our streams in proportion to Embree's single rays.
 fn race(set: &Set, contenders: &mut [Contender]) -> f64 {
     for chunk in set.rays.chunks(CHUNK) {
         for contender in &mut *contenders {
@@ -125,7 +126,7 @@ fn race(set: &Set, contenders: &mut [Contender]) -> f64 {
     };
     let figures: Vec<String> = contenders[1..].iter().map(figure).collect();
     println!("  {:<8} {:6.2} Mrays/s, {}", set.name, set.rays.len() as f64 / base * 1e-6, figures.join(", "));
-    base / contenders[2].total()
+    base / contenders[3].total()
 }
 
 fn is_same(a: f64, b: f64) -> bool {
@@ -145,6 +146,25 @@ fn trace(scene: &Scene, rays: &[Ray], any: bool, out: &mut Vec<f64>) {
                 out.extend(rays.iter().map(|ray| if scene.any(ray, |_, _| true) { 0.0 } else { f64::INFINITY }));
             } else {
                 out.extend(rays.iter().map(|ray| scene.hit(ray).map_or(f64::INFINITY, |hit| hit.t)));
+            }
+        }
+    }
+    scene.run(Rays(rays, any, out));
+}
+
+/// The same, asked for all at once.
+fn stream(scene: &Scene, rays: &[Ray], any: bool, out: &mut Vec<f64>) {
+    struct Rays<'r>(&'r [Ray], bool, &'r mut Vec<f64>);
+    impl Work for Rays<'_> {
+        type Output = ();
+
+        #[inline(always)]
+        fn run(self, scene: impl Tracer) {
+            let Self(rays, any, out) = self;
+            if any {
+                scene.any_of(rays, |_, _, _| true, |_, is_blocked| out.push(if is_blocked { 0.0 } else { f64::INFINITY }));
+            } else {
+                scene.hits(rays, |_, hit| out.push(hit.map_or(f64::INFINITY, |hit| hit.t)));
             }
         }
     }

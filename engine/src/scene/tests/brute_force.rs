@@ -3,7 +3,10 @@
 use super::*;
 use crate::{
     accel::Simd,
-    scene::geometry::{Geometry, LocalShape},
+    scene::{
+        Crossing, Tracer, Work,
+        geometry::{Geometry, LocalShape},
+    },
     shape::triangle::Sheared,
 };
 
@@ -37,7 +40,32 @@ fn found(scene: &Scene, ray: &Ray) -> Option<u64> {
     scene.closest(ray).map(|surface| surface.t.to_bits())
 }
 
+/// What many rays find at a time, and whether each crosses anything: by width, as single rays do.
+fn check_streams(scene: &mut Scene, rays: &[Ray]) {
+    struct Streams<'r>(&'r [Ray]);
+    impl Work for Streams<'_> {
+        type Output = ();
+
+        fn run(self, scene: impl Tracer) {
+            let Self(rays) = self;
+            let mut next = 0;
+            scene.hits(rays, |ray, hit| {
+                assert_eq!((ray, hit), (next, scene.hit(&rays[ray])), "{:?}", rays[ray]);
+                next += 1;
+            });
+            assert_eq!(next, rays.len());
+            let blocks = |_, _: u32, _: &Crossing| true;
+            scene.any_of(rays, blocks, |ray, is_blocked| assert_eq!(is_blocked, scene.hit(&rays[ray]).is_some(), "{:?}", rays[ray]));
+        }
+    }
+    for simd in [Simd::Baseline, Simd::detect()] {
+        scene.geometry.simd = simd;
+        scene.run(Streams(rays));
+    }
+}
+
 fn check(scene: &mut Scene, rays: &[Ray]) {
+    check_streams(scene, rays);
     for ray in rays {
         let expected = nearest(&scene.geometry, ray);
         let bits = expected.map(|(t, _)| t.to_bits());
@@ -135,7 +163,7 @@ fn split_triangles_are_hit_as_without_a_tree() {
 fn a_split_triangle_is_crossed_once() {
     let (scene, rays) = slivers();
     let mesh = &scene.geometry.meshes[0].tree;
-    let mut most = 0;
+    let mut expected = Vec::new();
     for ray in &rays {
         let sheared = Sheared::new(ray.origin, ray.direction);
         let hits = (0..mesh.count() as u32).filter(|&triangle| sheared.hit(sheared.turned(mesh.vertices(triangle))).is_some()).count();
@@ -145,9 +173,53 @@ fn a_split_triangle_is_crossed_once() {
             false
         }));
         assert_eq!(crossings, hits, "{ray:?}");
-        most = most.max(hits);
+        expected.push(hits);
     }
+    struct Counting<'r>(&'r [Ray]);
+    impl Work for Counting<'_> {
+        type Output = Vec<usize>;
+
+        fn run(self, scene: impl Tracer) -> Vec<usize> {
+            let mut crossings = vec![0; self.0.len()];
+            scene.any_of(
+                self.0,
+                |ray, _, _| {
+                    crossings[ray] += 1;
+                    false
+                },
+                |_, is_blocked| assert!(!is_blocked),
+            );
+            crossings
+        }
+    }
+    assert_eq!(scene.run(Counting(&rays)), expected);
+    let most = expected.into_iter().max().unwrap();
     assert!(most > 8, "{most}");
+}
+
+/// Rays that go the same way, eight at a time, and those that do not, some of them short, some that are not sound, beside a plane and a sphere.
+#[test]
+fn streams_find_what_single_rays_find() {
+    let mut maker = Maker::default();
+    maker.mesh(&ball(60, 80, 0.2), placement(&mut Random(3)));
+    maker.add(Shape::Plane { point: [0.0, -1.2, 0.0], normal: [0.0, 1.0, 0.1] }, DAffine3::IDENTITY);
+    maker.add(Shape::Sphere { center: [0.5, 1.0, 2.0], radius: 0.4 }, DAffine3::IDENTITY);
+    let mut scene = maker.compile();
+    let mut random = Random(17);
+    let mut rays: Vec<Ray> = (0..8_192).map(|i| scene.camera.ray(f64::from(i % 128) * 8.0, f64::from(i / 128) * 12.0)).collect();
+    rays.extend((0..8_192).map(|i| scene.camera.ray(480.0 + f64::from(i % 128) * 0.5, 400.0 + f64::from(i / 128) * 0.5)));
+    rays.extend(rays_of(&scene, 8_000));
+    for ray in &mut rays[8_192..] {
+        ray.t_max = if random.bits().is_multiple_of(4) { random.unit() * 20.0 } else { f64::INFINITY };
+    }
+    for (origin, direction) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (1e300, 1.0), (0.0, f64::NAN)] {
+        let at = random.bits() as usize % rays.len();
+        rays[at] = Ray::new(DVec3::splat(origin), DVec3::X * direction);
+    }
+    rays.truncate(rays.len() - 3);
+    check_streams(&mut scene, &rays);
+    let hits = rays.iter().filter(|ray| scene.closest(ray).is_some()).count();
+    assert!(hits > rays.len() / 4, "{hits}");
 }
 
 /// From a thousand to 10^12 scene sizes away.

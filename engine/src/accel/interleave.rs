@@ -1,0 +1,164 @@
+//! Rays through one tree in turns: while one waits for memory, the others compute.
+
+use std::mem::MaybeUninit;
+
+use super::{
+    block::Block,
+    mesh::MeshHit,
+    node::{LEAF, Node, near_bounds},
+    pack::Pack,
+    pages::prefetch,
+    pending::{Left, Pending},
+    simd::Lanes,
+    stream::Stream,
+};
+
+/// Rays under way at a time.
+pub const WALKERS: usize = 8;
+
+/// A ray under way.
+struct Walker<R> {
+    ray: usize,
+    /// See [`near_bounds`].
+    near: [usize; 3],
+    /// What it visits next.
+    current: u32,
+    pending: Pending<R>,
+}
+
+/// Places of walkers, by whether they are about to visit a node or a leaf: kept apart so that no branch depends on which it is, of which nobody could
+/// foretell the way.
+#[derive(Clone, Copy, Default)]
+struct Turn {
+    inner: [u8; WALKERS],
+    inner_count: usize,
+    leaf: [u8; WALKERS],
+    leaf_count: usize,
+}
+
+impl Turn {
+    /// Notes what a walker visits next, and asks memory for it.
+    ///
+    /// # Safety
+    /// Each walker is noted once a turn.
+    #[inline(always)]
+    unsafe fn note(&mut self, place: u8, current: u32, nodes: &[Node], packs: &[Pack]) {
+        let is_leaf = current & LEAF != 0;
+        // SAFETY: of `WALKERS` walkers, fewer were noted.
+        unsafe {
+            *self.inner.get_unchecked_mut(self.inner_count) = place;
+            *self.leaf.get_unchecked_mut(self.leaf_count) = place;
+        }
+        self.inner_count += usize::from(!is_leaf);
+        self.leaf_count += usize::from(is_leaf);
+        let (base, size) =
+            if is_leaf { (packs.as_ptr().cast::<u8>(), size_of::<Pack>()) } else { (nodes.as_ptr().cast(), size_of::<Node>()) };
+        prefetch(base.wrapping_add((current & !LEAF) as usize * size));
+    }
+}
+
+impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
+    /// Leads rays of the block, given by their numbers, through the mesh.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`. The numbers are below the block's count.
+    #[inline(always)]
+    pub unsafe fn interleave<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, numbers: &[u8]) {
+        let mut walkers = [const { MaybeUninit::<Walker<R>>::uninit() }; WALKERS];
+        let (mut first, mut second, mut begun) = (Turn::default(), Turn::default(), 0);
+        // Turns about, not copied: what was just written byte by byte would have to be waited for.
+        let (mut now, mut turn) = (&mut first, &mut second);
+        // SAFETY: places of walkers that began are noted. They visit nodes and leaves of this tree, and are never deeper in it than `MAX_DEPTH`.
+        unsafe {
+            while begun < WALKERS.min(numbers.len()) {
+                let place = begun;
+                let walker = walkers.get_unchecked_mut(place).write(Walker { ray: 0, near: [0; 3], current: 0, pending: Pending::new() });
+                self.begin::<R, ANY>(walker, place, numbers, &mut begun);
+                now.note(place as u8, walker.current, self.nodes, self.packs);
+            }
+            loop {
+                if now.inner_count + now.leaf_count == 0 {
+                    return;
+                }
+                (turn.inner_count, turn.leaf_count) = (0, 0);
+                for &place in now.inner.get_unchecked(..now.inner_count) {
+                    let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
+                    if self.step::<L, R>(walker) || self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun) {
+                        turn.note(place, walker.current, self.nodes, self.packs);
+                    }
+                }
+                for &place in now.leaf.get_unchecked(..now.leaf_count) {
+                    let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
+                    self.visit::<L, ANY>(walker.current & !LEAF, walker.ray, place.into());
+                    if self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun) {
+                        turn.note(place, walker.current, self.nodes, self.packs);
+                    }
+                }
+                std::mem::swap(&mut now, &mut turn);
+            }
+        }
+    }
+
+    /// Visits a node; whether a child is met, which is then next.
+    ///
+    /// # Safety
+    /// The walker is at a node of the tree. The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn step<L: Lanes, R: Left<L>>(&self, walker: &mut Walker<R>) -> bool {
+        let (block, ray) = (&*self.block, walker.ray);
+        // SAFETY: by this function's own condition; the ray is one of the block.
+        unsafe {
+            let node = self.nodes.get_unchecked(walker.current as usize);
+            let [x, y, z] = &block.origin;
+            let origin = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
+            let [x, y, z] = &block.inverse_near;
+            let inverse_near = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
+            let [x, y, z] = &block.inverse_far;
+            let inverse_far = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
+            let limit = L::splat(Block::of(&block.limit, ray));
+            let (enter, leave) = node.meet(walker.near, [origin, inverse_near], [origin, inverse_far], limit);
+            let met = R::of(enter, leave);
+            let (_, next) = met.next();
+            let rest = met.rest(next);
+            walker.pending.push(walker.current, rest, !rest.is_empty());
+            walker.current = *node.children.get_unchecked(next);
+            !met.is_empty()
+        }
+    }
+
+    /// Finds what a walker that met nothing visits next, perhaps with another ray; whether there is anything.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn go_on<L: Lanes, R: Left<L>, const ANY: bool>(
+        &mut self,
+        walker: &mut Walker<R>,
+        place: usize,
+        numbers: &[u8],
+        begun: &mut usize,
+    ) -> bool {
+        // SAFETY: by this function's own condition; the ray is one of the block, and pending are children of this tree's nodes.
+        unsafe {
+            match walker.pending.pop::<L>(Block::of(&self.block.limit, walker.ray)) {
+                Some(child) => walker.current = child.reference(self.nodes),
+                None if *begun < numbers.len() => self.begin::<R, ANY>(walker, place, numbers, begun),
+                None => return false,
+            }
+        }
+        true
+    }
+
+    /// Gives a walker the next ray.
+    #[inline(always)]
+    fn begin<R: Copy, const ANY: bool>(&mut self, walker: &mut Walker<R>, place: usize, numbers: &[u8], begun: &mut usize) {
+        walker.ray = numbers[*begun].into();
+        *begun += 1;
+        walker.near = near_bounds(self.block.negative[walker.ray].into());
+        walker.current = self.root;
+        walker.pending.clear();
+        if ANY {
+            self.told[place].clear();
+        }
+    }
+}
