@@ -1,6 +1,6 @@
 //! Finding what a ray meets: bounding volume hierarchies and their traversal.
 //!
-//! obvhs builds binary trees; `collapse` turns them into nodes of eight children, `traverse` walks those, eight boxes at a time. Two such levels
+//! `build` makes binary trees; `collapse` turns them into nodes of eight children, `traverse` walks those, eight boxes at a time. Two such levels
 //! make a scene: a top level over objects, and one tree for every mesh, shared by all its instances.
 //!
 //! Boxes and triangle filters are f32 and *conservative*: they may let a ray through in vain, but never lose a hit. What is a hit, and
@@ -8,14 +8,17 @@
 //! apart by the objects' order.
 
 mod build;
+mod cluster;
 mod collapse;
 mod frame;
+mod identity;
 mod median;
 mod mesh;
 mod node;
 mod pack;
 mod pages;
 mod pencil;
+mod reinsert;
 mod simd;
 mod spheres;
 mod split;
@@ -23,6 +26,7 @@ mod traverse;
 mod tree;
 
 pub use collapse::LeafRule;
+pub use identity::Identity;
 pub use mesh::{MeshHit, MeshTree};
 pub use pencil::Pencil;
 #[cfg(target_arch = "x86_64")]

@@ -1,6 +1,6 @@
 //! Nodes of eight children.
 
-use super::simd::Lanes;
+use super::{identity::Identity, simd::Lanes};
 
 /// Bytes of one bound of all children of a node.
 pub const BOUND: usize = size_of::<[f32; 8]>();
@@ -31,6 +31,12 @@ impl Node {
         ],
         children: [LEAF; 8],
     };
+
+    /// Adds all that it is.
+    pub fn identify(&self, identity: &mut Identity) {
+        identity.floats(self.bounds.as_flattened());
+        identity.numbers(&self.children);
+    }
 
     /// Parameters at which a ray meets one bound of every child.
     ///

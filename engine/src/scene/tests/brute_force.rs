@@ -37,7 +37,8 @@ fn found(scene: &Scene, ray: &Ray) -> Option<u64> {
     scene.closest(ray).map(|surface| surface.t.to_bits())
 }
 
-fn check(scene: &mut Scene, rays: &[Ray]) {
+/// Holds a scene's answers against brute force, for both vector widths.
+pub fn check(scene: &mut Scene, rays: &[Ray]) {
     for ray in rays {
         let expected = nearest(&scene.geometry, ray);
         let bits = expected.map(|(t, _)| t.to_bits());
