@@ -97,7 +97,7 @@ fn line(i: usize, _: usize) -> [Vec3; 3] {
 /// A small ball of small triangles; every hundredth belongs to the stands.
 fn stadium(i: usize, _: usize) -> [Vec3; 3] {
     let mut numbers = Numbers::new(i);
-    let (radius, size) = if i % 100 == 0 { (1e3, 100.0) } else { (1.0, 0.01) };
+    let (radius, size) = if i.is_multiple_of(100) { (1e3, 100.0) } else { (1.0, 0.01) };
     let middle = numbers.point().normalize_or(Vec3::X) * radius;
     [(); 3].map(|()| middle + numbers.point() * size)
 }
