@@ -5,7 +5,7 @@ use crate::accel::Identity;
 
 impl Scene {
     /// Equal for scenes whose trees are equal to the last bit, on every machine; others differ. Pictures do not depend on it, except where rays hit several
-    /// things at equal distances, but time does. Takes about a fiftieth of the time that compiling took.
+    /// things at equal distances, but time does.
     pub fn tree_hash(&self) -> [u8; 32] {
         let mut identity = Identity::new();
         if let Some(tree) = &self.geometry.tree {
