@@ -1,13 +1,8 @@
 //! Binary trees over boxes.
 
-use glam::{Vec3, Vec3A};
-use obvhs::{
-    aabb::Aabb,
-    bvh2::{Bvh2, reinsertion::ReinsertionOptimizer},
-    ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
-};
+use glam::Vec3;
 
-use super::median;
+use super::{cluster, median, reinsert, traverse::MAX_DEPTH};
 
 /// A box in normalised coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,54 +58,123 @@ pub struct BinaryNode {
 pub enum Below {
     /// The box of this index.
     Leaf(u32),
-    /// Two nodes, at this index and the next; both stand after their parent.
+    /// Two nodes, at this index and the next.
     Pair(u32),
 }
 
-/// Builds a tree over at least one box; all are finite and in [-1, 1]. The root is node 0. The same boxes give the same tree everywhere.
+/// Builds a tree over at least one box; all are finite and in [-1, 1]. The root is node 0, children stand after their parents, and what is below the first
+/// of two comes right after them, before what is below the second. No way through it is longer than may be traversed. The same boxes give the same tree everywhere.
 pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
-    if is_nested(boxes) { median::build(boxes) } else { clustered(boxes) }
+    let nodes = in_order(&reinsert::improve(cluster::build(boxes)));
+    if depth(&nodes) <= MAX_DEPTH { nodes } else { median::build(boxes) }
 }
 
-/// Locally ordered clustering (Meister, Bittner, "Parallel Locally-Ordered Clustering for BVH Construction", 2018), then reinsertion (Meister, Bittner,
-/// "Parallel Reinsertion for BVH Optimization", 2018).
-fn clustered(boxes: &[Box3]) -> Vec<BinaryNode> {
-    if boxes.len() < 3 {
-        return median::build(boxes);
-    }
-    let aabbs: Vec<Aabb> = boxes.iter().map(|b| Aabb::new(Vec3A::from(b.min), Vec3A::from(b.max))).collect();
-    let indices = (0..boxes.len() as u32).collect();
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(PlocSearchDistance::Medium, &aabbs, indices, SortPrecision::U64, 1);
-    ReinsertionOptimizer::default().run(&mut tree, 0.15, None);
-    from_obvhs(&tree)
-}
-
-fn from_obvhs(tree: &Bvh2) -> Vec<BinaryNode> {
-    let node = |index: usize| {
-        let node = &tree.nodes[index];
-        let bounds = Box3 { min: node.aabb.min.into(), max: node.aabb.max.into() };
-        let below =
-            if node.is_leaf() { Below::Leaf(tree.primitive_indices[node.first_index as usize]) } else { Below::Pair(node.first_index) };
-        BinaryNode { bounds, below }
-    };
-    // Reinsertion leaves children anywhere: number them anew, parents first.
-    let mut nodes = vec![node(0)];
-    let mut next = 0;
-    while next < nodes.len() {
-        if let Below::Pair(first) = nodes[next].below {
-            nodes[next].below = Below::Pair(nodes.len() as u32);
-            nodes.extend([node(first as usize), node(first as usize + 1)]);
+/// The same tree with its nodes in the order that [`build`] promises.
+fn in_order(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
+    let mut ordered = Vec::with_capacity(nodes.len());
+    ordered.push(nodes[0]);
+    let mut work = vec![0usize];
+    while let Some(at) = work.pop() {
+        if let Below::Pair(first) = ordered[at].below {
+            let new = ordered.len();
+            ordered[at].below = Below::Pair(new as u32);
+            ordered.extend_from_slice(&nodes[first as usize..first as usize + 2]);
+            work.extend([new + 1, new]);
         }
-        next += 1;
     }
-    nodes
+    ordered
 }
 
-/// Whether many boxes share a middle. Clustering joins the smallest of nested boxes first and then one at a time: it would take
-/// quadratic time and end in a chain.
-fn is_nested(boxes: &[Box3]) -> bool {
-    const MANY: usize = 128;
-    let mut middles: Vec<[i32; 3]> = boxes.iter().map(|b| (b.centroid() * (1 << 20) as f32).to_array().map(|x| x as i32)).collect();
-    middles.sort_unstable();
-    middles.len() > MANY && (MANY..middles.len()).any(|i| middles[i] == middles[i - MANY])
+/// Nodes on the longest way from the root, or 255 if there are more. A wide tree is never deeper than the binary tree that it is made of.
+fn depth(nodes: &[BinaryNode]) -> usize {
+    let mut depth = vec![1u8; nodes.len()];
+    for (at, node) in nodes.iter().enumerate() {
+        if let Below::Pair(first) = node.below {
+            let below = depth[at].saturating_add(1);
+            depth[first as usize..first as usize + 2].fill(below);
+        }
+    }
+    depth.into_iter().max().unwrap_or(0).into()
+}
+
+const _: () = assert!(MAX_DEPTH < 255);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Boxes of all kinds: anywhere, equal, nested in a corner, nested about a middle, one around all others.
+    fn feared(count: u32) -> Vec<Vec<Box3>> {
+        let cube = |middle: Vec3, half: f32| Box3 { min: middle - half, max: middle + half };
+        let anywhere = |i: u32| Vec3::new((i * 7919 % 1009) as f32, (i * 104_729 % 997) as f32, (i * 1_299_709 % 991) as f32) / 1009.0;
+        let part = |i: u32| i as f32 / count as f32;
+        vec![
+            (0..count).map(|i| cube(anywhere(i) - 0.5, 0.01)).collect(),
+            (0..count).map(|_| cube(Vec3::ZERO, 0.5)).collect(),
+            (0..count).map(|i| Box3 { min: Vec3::NEG_ONE, max: Vec3::splat(part(i)) }).collect(),
+            (0..count).map(|i| cube(Vec3::ZERO, part(count - i))).collect(),
+            (0..count).map(|i| if i == 7 { cube(Vec3::ZERO, 1.0) } else { cube(anywhere(i) - 0.5, 0.001) }).collect(),
+            (0..count).map(|i| cube(anywhere(i) * 0.1, 0.9)).collect(),
+        ]
+    }
+
+    /// Every box is below the root once, and every node's box is that of what is below it.
+    fn check(nodes: &[BinaryNode], boxes: &[Box3]) {
+        let mut seen = vec![false; boxes.len()];
+        let mut work = vec![0usize];
+        while let Some(at) = work.pop() {
+            match nodes[at].below {
+                Below::Leaf(index) => {
+                    assert_eq!(nodes[at].bounds, boxes[index as usize]);
+                    assert!(!std::mem::replace(&mut seen[index as usize], true));
+                }
+                Below::Pair(first) => {
+                    let first = first as usize;
+                    assert_eq!(nodes[at].bounds, nodes[first].bounds.union(nodes[first + 1].bounds));
+                    work.extend([first, first + 1]);
+                }
+            }
+        }
+        assert!(seen.into_iter().all(|seen| seen));
+    }
+
+    fn cost(nodes: &[BinaryNode]) -> f64 {
+        nodes.iter().map(|node| f64::from(node.bounds.half_area())).sum()
+    }
+
+    #[test]
+    fn trees_hold_every_box_once_however_many_there_are() {
+        for count in (1..40).chain([1000]) {
+            for boxes in feared(count) {
+                let clustered = cluster::build(&boxes);
+                check(&clustered, &boxes);
+                check(&reinsert::improve(clustered), &boxes);
+                for nodes in [build(&boxes), median::build(&boxes)] {
+                    check(&nodes, &boxes);
+                    assert_eq!(in_order(&nodes), nodes);
+                }
+            }
+        }
+    }
+
+    /// As published, clustering makes chains of nested and of equal boxes, as deep as they are many.
+    #[test]
+    fn clusters_of_feared_boxes_are_shallow() {
+        for (kind, boxes) in feared(20_000).iter().enumerate() {
+            let depth = depth(&in_order(&cluster::build(boxes)));
+            assert!(depth <= 40, "{kind}: {depth}");
+        }
+    }
+
+    #[test]
+    fn clustering_beats_medians_and_reinsertion_beats_clustering() {
+        for (kind, boxes) in feared(5000).iter().enumerate() {
+            let clustered = cluster::build(boxes);
+            let (by_median, by_cluster, improved) =
+                (cost(&median::build(boxes)), cost(&clustered), cost(&reinsert::improve(clustered.clone())));
+            println!("{kind}: {by_median} by medians, {by_cluster} by clusters, {improved} improved");
+            assert!(by_cluster < by_median * 1.01, "{kind}");
+            assert!(improved < by_cluster * 1.0001, "{kind}");
+        }
+    }
 }

@@ -23,15 +23,19 @@ pub struct Collapsed {
     pub root: u32,
 }
 
-/// For every node of the binary tree: the least cost of its subtree when it takes up one, two, ... seven places of a wide node, and how to
-/// reach it (Wald et al., "Getting Rid of Packets", 2008; Ylitie et al., "Efficient Incoherent Ray Traversal on GPUs Through
-/// Compressed Wide BVHs", 2017, section 3.1).
+/// How a subtree is best collapsed when it takes up one, two, ... seven places of a wide node.
+#[derive(Clone, Copy)]
 struct Plan {
-    cost: [f32; 7],
     /// `split[k - 1]`: with k places, how many go to the first child; 0: use one place less.
     split: [u8; 7],
     /// How many of a wide node's eight places go to the first child, where this node becomes one; 0 where it becomes a leaf.
     wide: u8,
+}
+
+/// What a subtree costs at the least with one, two, ... seven places, and how many boxes it has.
+#[derive(Clone, Copy)]
+struct Costs {
+    of: [f32; 7],
     count: u32,
 }
 
@@ -39,18 +43,35 @@ struct Plan {
 pub struct Collapse {
     binary: Vec<BinaryNode>,
     plans: Vec<Plan>,
+    cost: f32,
 }
 
 impl Collapse {
-    /// Finds the wide tree of least surface area cost.
+    /// Finds the wide tree of least surface area cost (Wald et al., "Getting Rid of Packets", 2008; Ylitie et al., "Efficient Incoherent Ray Traversal on
+    /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::build`].
     pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule) -> Self {
-        let plans = plan(&binary, rule);
-        Self { binary, plans }
+        let mut plans = vec![Plan { split: [0; 7], wide: 0 }; binary.len()];
+        // Costs are asked for once, by the parent. From the last pair to the first, those of the children of both of a pair are the last that were found.
+        let mut known: Vec<Costs> = Vec::new();
+        let mut of = |at: usize, known: &mut Vec<Costs>| {
+            let children = matches!(binary[at].below, Below::Pair(_)).then(|| [known.pop(), known.pop()]);
+            let children = if let Some([Some(first), Some(second)]) = children { Some([first, second]) } else { None };
+            let (plan, costs) = weigh(binary[at].bounds.half_area(), children, rule);
+            plans[at] = plan;
+            costs
+        };
+        for first in (1..binary.len()).step_by(2).rev() {
+            let first_costs = of(first, &mut known);
+            let second_costs = of(first + 1, &mut known);
+            known.extend([second_costs, first_costs]);
+        }
+        let cost = of(0, &mut known).of[0];
+        Self { binary, plans, cost }
     }
 
     /// What a random ray costs, in visits of a node times the area of a box.
     pub fn cost(&self) -> f32 {
-        self.plans[0].cost[0]
+        self.cost
     }
 
     /// Makes the wide tree. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).
@@ -78,8 +99,9 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
         out.nodes.push(Node::EMPTY);
         work.push((0usize, 0usize));
     }
+    let mut children = Vec::with_capacity(8);
     while let Some((at, place)) = work.pop() {
-        let mut children = Vec::with_capacity(8);
+        children.clear();
         if let Below::Pair(first) = binary[at].below {
             gather(binary, plans, first as usize, plans[at].wide.into(), &mut children);
             gather(binary, plans, first as usize + 1, 8 - usize::from(plans[at].wide), &mut children);
@@ -105,43 +127,31 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
     out
 }
 
-fn plan(binary: &[BinaryNode], rule: LeafRule) -> Vec<Plan> {
-    let mut plans: Vec<Plan> = binary.iter().map(|_| Plan { cost: [0.0; 7], split: [0; 7], wide: 0, count: 1 }).collect();
-    for at in (0..binary.len()).rev() {
-        let area = binary[at].bounds.half_area();
-        let Below::Pair(first) = binary[at].below else {
-            plans[at].cost = [area * rule.cost; 7];
-            continue;
-        };
-        let (left, right) = (&plans[first as usize], &plans[first as usize + 1]);
-        let best_split = |places: usize| {
-            let cost = |k: usize| left.cost[k - 1] + right.cost[places - k - 1];
-            let fits = |k: &usize| *k <= 7 && places - k <= 7;
-            (1..places)
-                .filter(fits)
-                .map(|k| (cost(k), k as u8))
-                .fold((f32::INFINITY, 1), |best, next| if next.0 < best.0 { next } else { best })
-        };
-        let mut here = Plan { cost: [0.0; 7], split: [0; 7], wide: 0, count: left.count + right.count };
-        let (below, wide) = best_split(8);
-        let as_leaf = if here.count <= rule.most { area * rule.cost } else { f32::INFINITY };
-        if as_leaf <= area + below {
-            here.cost[0] = as_leaf;
-        } else {
-            here.cost[0] = area + below;
-            here.wide = wide;
-        }
-        for places in 2..=7 {
-            let (cost, split) = best_split(places);
-            here.cost[places - 1] = here.cost[places - 2];
-            if cost < here.cost[places - 2] {
-                here.cost[places - 1] = cost;
-                here.split[places - 1] = split;
-            }
-        }
-        plans[at] = here;
+/// The best plan for a node of this area: a leaf, or what its children are.
+fn weigh(area: f32, children: Option<[Costs; 2]>, rule: LeafRule) -> (Plan, Costs) {
+    let mut plan = Plan { split: [0; 7], wide: 0 };
+    let Some([first, second]) = children else { return (plan, Costs { of: [area * rule.cost; 7], count: 1 }) };
+    let best_split = |places: usize| {
+        let splits = places.saturating_sub(7).max(1)..places.min(8);
+        let costs = splits.map(|k| (first.of[k - 1] + second.of[places - k - 1], k as u8));
+        costs.fold((f32::INFINITY, 1), |best, next| if next.0 < best.0 { next } else { best })
+    };
+    let count = first.count + second.count;
+    let (below, wide) = best_split(8);
+    let as_leaf = if count <= rule.most { area * rule.cost } else { f32::INFINITY };
+    if as_leaf > area + below {
+        plan.wide = wide;
     }
-    plans
+    let mut of = [as_leaf.min(area + below); 7];
+    for places in 2..=7 {
+        let (cost, split) = best_split(places);
+        of[places - 1] = of[places - 2];
+        if cost < of[places - 2] {
+            of[places - 1] = cost;
+            plan.split[places - 1] = split;
+        }
+    }
+    (plan, Costs { of, count })
 }
 
 /// The nodes that take up to `places` places for the subtree at `at`.

@@ -2,7 +2,7 @@
 
 use super::build::{Below, BinaryNode, Box3};
 
-/// Builds a tree over at least one box whose depth is the logarithm of their number.
+/// Builds a tree over at least one box whose depth is the logarithm of their number, its nodes in the order of [`super::build::build`].
 pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = vec![BinaryNode { bounds: Box3::EMPTY, below: Below::Leaf(0) }];
@@ -19,8 +19,8 @@ pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
         let first = nodes.len();
         nodes[at] = BinaryNode { bounds, below: Below::Pair(first as u32) };
         nodes.extend([nodes[at]; 2]);
-        work.push((first, range.start..range.start + middle));
         work.push((first + 1, range.start + middle..range.end));
+        work.push((first, range.start..range.start + middle));
     }
     nodes
 }

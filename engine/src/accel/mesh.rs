@@ -8,6 +8,7 @@ use super::{
     build::Box3,
     collapse::{Collapse, LeafRule},
     frame::Normalisation,
+    identity::Identity,
     pack::{Pack, PackRay},
     pages::settle,
     simd::Lanes,
@@ -48,10 +49,10 @@ struct Cheapest {
 }
 
 impl Cheapest {
-    fn of(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3]) -> Self {
-        let plain = Self { tree: Tree::plan(whole, LEAVES), triangles: Vec::new() };
-        let Some(References { boxes, triangles }) = split(whole, vertices) else { return plain };
-        let parts = Self { tree: Tree::plan(&boxes, LEAVES), triangles };
+    fn of(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3], leaves: LeafRule) -> Self {
+        let parts = split(whole, vertices).map(|References { boxes, triangles }| Self { tree: Tree::plan(&boxes, leaves), triangles });
+        let plain = Self { tree: Tree::plan(whole, leaves), triangles: Vec::new() };
+        let Some(parts) = parts else { return plain };
         if parts.tree.cost() < plain.tree.cost() { parts } else { plain }
     }
 }
@@ -61,7 +62,11 @@ const LEAVES: LeafRule = LeafRule { most: 8, cost: 0.7 };
 
 impl MeshTree {
     /// Builds the tree of at least one triangle; positions are finite and indices in range.
-    pub fn build(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+    pub fn build(positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self::build_with(positions, triangles, LEAVES)
+    }
+
+    fn build_with(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>, leaves: LeafRule) -> Self {
         let corners = triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3());
         let frame = Normalisation::scaling(Bounds::of(corners));
         // What scaling cannot keep, being 2^-126 of the mesh's size, is nothing for all who look at a position.
@@ -69,7 +74,8 @@ impl MeshTree {
         positions.iter_mut().zip(&scaled).for_each(|(p, scaled)| *p = frame.unscaled(scaled.as_dvec3()).as_vec3().into());
         let vertices = |triangle: u32| triangles[triangle as usize].map(|i| scaled[i as usize]);
         let boxes: Vec<Box3> = (0..triangles.len() as u32).map(|triangle| Box3::of(vertices(triangle))).collect();
-        let cheapest = Cheapest::of(&boxes, vertices);
+        let cheapest = Cheapest::of(&boxes, vertices, leaves);
+        drop(boxes);
         let mut packs = Vec::new();
         let tree = Tree::carry_out(frame, cheapest.tree, |leaf| {
             let mut leaf: Vec<u32> = leaf.iter().map(|&part| cheapest.triangles.get(part as usize).copied().unwrap_or(part)).collect();
@@ -107,6 +113,24 @@ impl MeshTree {
     #[inline(always)]
     pub fn vertices(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// The same mesh with other leaves.
+    #[cfg(test)]
+    pub fn with_leaves(&self, leaves: LeafRule) -> Self {
+        Self::build_with(self.positions.clone(), self.triangles.clone(), leaves)
+    }
+
+    /// Adds its nodes and packs.
+    pub fn identify(&self, identity: &mut Identity) {
+        self.tree.identify(identity);
+        identity.numbers(&[self.packs.len() as u32]);
+        self.packs.iter().for_each(|pack| pack.identify(identity));
+    }
+
+    /// Nodes on the longest way through its tree.
+    pub fn depth(&self) -> usize {
+        self.tree.depth()
     }
 
     /// Memory in bytes.

@@ -1,6 +1,6 @@
 //! Finding what a ray meets: bounding volume hierarchies and their traversal.
 //!
-//! obvhs builds binary trees; `collapse` turns them into nodes of eight children, `traverse` walks those, eight boxes at a time. Two such levels
+//! `build` makes binary trees; `collapse` turns them into nodes of eight children, `traverse` walks those, eight boxes at a time. Two such levels
 //! make a scene: a top level over objects, and one tree for every mesh, shared by all its instances.
 //!
 //! Boxes and triangle filters are f32 and *conservative*: they may let a ray through in vain, but never lose a hit. What is a hit, and
@@ -9,8 +9,10 @@
 
 mod block;
 mod build;
+mod cluster;
 mod collapse;
 mod frame;
+mod identity;
 mod interleave;
 mod median;
 mod mesh;
@@ -20,6 +22,7 @@ mod packet;
 mod pages;
 mod pencil;
 mod pending;
+mod reinsert;
 mod simd;
 mod spheres;
 mod split;
@@ -29,6 +32,7 @@ mod tree;
 
 pub use block::SIZE as BLOCK;
 pub use collapse::LeafRule;
+pub use identity::Identity;
 pub use mesh::{MeshHit, MeshTree};
 pub use pencil::Pencil;
 #[cfg(target_arch = "x86_64")]

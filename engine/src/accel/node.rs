@@ -1,6 +1,6 @@
 //! Nodes of eight children.
 
-use super::simd::Lanes;
+use super::{identity::Identity, simd::Lanes};
 
 /// Bytes of one bound of all children of a node.
 pub const BOUND: usize = size_of::<[f32; 8]>();
@@ -31,6 +31,12 @@ impl Node {
         ],
         children: [LEAF; 8],
     };
+
+    /// Adds all that it is.
+    pub fn identify(&self, identity: &mut Identity) {
+        identity.floats(self.bounds.as_flattened());
+        identity.numbers(&self.children);
+    }
 
     /// Where a ray enters and leaves each child's box, before `limit`; of an empty place, no numbers or such that it leaves before it enters. Near and far
     /// bounds are given an origin and an inverse direction each, by axis: for one ray the same origin, for several rays those that make distances to near bounds

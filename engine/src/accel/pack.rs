@@ -4,6 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     frame::{BoxRay, FINEST},
+    identity::Identity,
     simd::Lanes,
 };
 use crate::{
@@ -102,6 +103,13 @@ impl Pack {
             pack.ids[slot] = id;
         }
         pack
+    }
+
+    /// Adds all that it is.
+    pub fn identify(&self, identity: &mut Identity) {
+        identity.floats(self.vertices.as_flattened().as_flattened());
+        identity.floats(&self.extent);
+        identity.numbers(&self.ids);
     }
 
     /// Number of the triangle in a place.

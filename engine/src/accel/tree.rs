@@ -8,11 +8,11 @@ use super::{
     build::{self, Box3},
     collapse::{Collapse, Collapsed, LeafRule},
     frame::{BoxRay, Normalisation},
-    median,
+    identity::Identity,
     node::{LEAF, Node},
     pages::settle,
     simd::Lanes,
-    traverse::{MAX_DEPTH, traverse},
+    traverse::traverse,
 };
 use crate::shape::Bounds;
 
@@ -36,8 +36,7 @@ impl Tree {
 
     /// The best tree over boxes in normalised coordinates.
     pub fn plan(boxes: &[Box3], rule: LeafRule) -> Collapse {
-        let binary = build::build(boxes);
-        Collapse::plan(if depth_fits(&binary) { binary } else { median::build(boxes) }, rule)
+        Collapse::plan(build::build(boxes), rule)
     }
 
     /// Makes a planned tree. `leaf` as for [`Self::build`].
@@ -75,26 +74,30 @@ impl Tree {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     pub unsafe fn visit<L: Lanes, const ANY: bool>(&self, ray: &BoxRay, limit: f32, leaf: impl FnMut(u32) -> ControlFlow<(), f32>) {
-        // SAFETY: `build` made the nodes, and checked their depth.
+        // SAFETY: `build` made the nodes, which are never too deep.
         unsafe { traverse::<L, ANY>(&self.nodes, self.root, ray, limit, leaf) }
+    }
+
+    /// Adds all that it is, but for its coordinates.
+    pub fn identify(&self, identity: &mut Identity) {
+        identity.numbers(&[self.nodes.len() as u32, self.root]);
+        self.nodes.iter().for_each(|node| node.identify(identity));
+    }
+
+    /// Nodes on the longest way from the root to a leaf.
+    pub fn depth(&self) -> usize {
+        let mut depth = vec![1; self.nodes.len()];
+        // Children stand after their parents.
+        for (at, node) in self.nodes.iter().enumerate() {
+            node.children.iter().filter(|child| *child & LEAF == 0).for_each(|child| depth[*child as usize] = depth[at] + 1);
+        }
+        depth.into_iter().max().unwrap_or(0)
     }
 
     /// Memory of the nodes in bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&*self.nodes)
     }
-}
-
-/// Whether the stack of a traversal is large enough: a wide tree is never deeper than the binary tree that it was made of.
-fn depth_fits(binary: &[build::BinaryNode]) -> bool {
-    let mut depth = vec![1; binary.len()];
-    for (at, node) in binary.iter().enumerate() {
-        if let build::Below::Pair(first) = node.below {
-            depth[first as usize] = depth[at] + 1;
-            depth[first as usize + 1] = depth[at] + 1;
-        }
-    }
-    depth.into_iter().max().unwrap_or(0) <= MAX_DEPTH
 }
 
 #[cfg(test)]

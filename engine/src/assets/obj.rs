@@ -253,6 +253,7 @@ impl Reader {
             }
             materials.push(found.unwrap_or_else(|| ModelMaterial::matte(name, if colored { 1.0 } else { DEFAULT_GREY }, true)));
         }
+        self.warnings.flat_triangles(self.soup.flat);
         let (mut meshes, bad_normals) = self.soup.into_meshes(&self.materials);
         for mesh in meshes.iter_mut().filter(|mesh| mesh.uvs.is_empty() && materials[mesh.material].texture.is_some()) {
             mesh.uvs = vec![[0.0; 2]; mesh.positions.len()];

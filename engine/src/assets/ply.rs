@@ -53,6 +53,7 @@ fn finish(soup: Soup, mut warnings: Warnings) -> Result<LoadedModel, AssetError>
     }
     let grey = if soup.colors.is_empty() { DEFAULT_GREY } else { 1.0 };
     let materials = vec![ModelMaterial::matte("default", grey, true)];
+    warnings.flat_triangles(soup.flat);
     let (meshes, bad_normals) = soup.into_meshes(&["default".to_owned()]);
     if bad_normals > 0 {
         warnings.file("some normals have no direction; their triangles' are taken there");

@@ -29,10 +29,12 @@ pub(super) struct Soup {
     triangles: Vec<[Corner; 3]>,
     smoothing: Vec<Smoothing>,
     materials: Vec<u32>,
+    /// Triangles that were left out.
+    pub flat: usize,
 }
 
 impl Soup {
-    /// Adds a polygon; every index is in range. Triangles that name a position twice have no area and are left out.
+    /// Adds a polygon; every index is in range. Triangles that name a position twice have no area and are left out, counted.
     pub fn push(&mut self, corners: &[Corner], smoothing: Smoothing, material: u32) {
         let mut add = |triangle: [Corner; 3]| {
             let [a, b, c] = triangle.map(|corner| corner.position);
@@ -40,6 +42,8 @@ impl Soup {
                 self.triangles.push(triangle);
                 self.smoothing.push(smoothing);
                 self.materials.push(material);
+            } else {
+                self.flat += 1;
             }
         };
         match *corners {

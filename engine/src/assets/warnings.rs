@@ -23,6 +23,13 @@ impl Warnings {
         self.object("", String::new(), text);
     }
 
+    /// Says how many triangles of the whole file were left out, if any, because they name a vertex twice.
+    pub fn flat_triangles(&mut self, count: usize) {
+        if count > 0 {
+            self.file(format!("triangles that name a vertex twice have no area; left out ({count})"));
+        }
+    }
+
     /// Warns of one object of the file. The same text for several objects becomes one warning.
     pub fn object(&mut self, kind: &'static str, name: impl Into<String>, text: impl Into<String>) {
         let (name, text) = (name.into(), text.into());

@@ -1,4 +1,5 @@
-//! A small frame that every node renders before it is given work: equal hashes show that it computes the same bits as the others.
+//! A small frame that every node renders before it is given work: equal hashes show that it computes the same bits as the others, and builds the same
+//! trees: where rays hit several things at equal distances, what they see may depend on the tree.
 
 use std::{io, sync::atomic::AtomicBool};
 
@@ -6,6 +7,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{Rect, RenderedPart, SampleRange, render};
 use crate::{
+    accel::{Identity, MeshTree},
     description::{
         Camera, ColorSpace, Falloff, Film, Filter, Frame, Group, Light, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind,
         Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
@@ -18,16 +20,28 @@ use crate::{
 #[error("the canary frame cannot be rendered: {0}")]
 pub struct CanaryError(String);
 
-/// The hash of a small part of the canary, for samples of this seed.
+/// The hash of the canary, for samples of this seed: BLAKE3 over those of its pixels, of its trees, and of a tree that takes all ways through the builder.
 ///
 /// # Errors
 /// Only if the engine is at fault.
 pub fn canary_hash(seed: u64) -> Result<[u8; 32], CanaryError> {
     let (frame, assets) = canary(seed)?;
     let scene = scene::Scene::compile(&frame, &assets).map_err(fault)?;
-    let rect = Rect { x: 0, y: 0, width: frame.film.width, height: frame.film.height };
-    let samples = SampleRange { first: 0, count: frame.quality.samples.into() };
-    render(&scene, rect, samples, &AtomicBool::new(false)).map(|part: RenderedPart| part.hash()).map_err(fault)
+    proof(&scene)
+}
+
+/// What a node with this canary answers.
+fn proof(scene: &scene::Scene) -> Result<[u8; 32], CanaryError> {
+    let mut hasher = blake3::Hasher::new();
+    [pixels(scene)?, scene.tree_hash(), hash(&thicket())].iter().for_each(|hash| _ = hasher.update(hash));
+    Ok(*hasher.finalize().as_bytes())
+}
+
+/// The hash of all pixels of a scene.
+fn pixels(scene: &scene::Scene) -> Result<[u8; 32], CanaryError> {
+    let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
+    let samples = SampleRange { first: 0, count: scene.quality.samples.into() };
+    render(scene, rect, samples, &AtomicBool::new(false)).map(|part: RenderedPart| part.hash()).map_err(fault)
 }
 
 fn fault(error: impl ToString) -> CanaryError {
@@ -109,6 +123,25 @@ fn lights() -> Vec<Light> {
     ]
 }
 
+/// The tree of a mesh as builders fear them: long thin triangles, which are split, nested ones, which hardly cluster, and equal ones.
+fn thicket() -> MeshTree {
+    let thorn = |i: u32| {
+        let [x, y, z] = [i * 7 % 16, i * 11 % 13, i * 5 % 9].map(|x| x as f32 * 0.1);
+        [[x, y, z], [x + 0.01, y, z], [z, x + 1.0, y + 1.0]]
+    };
+    let shell = |i: u32| [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|p| p.map(|x| x * (0.1 + i as f32 * 0.001)));
+    let equal = [[0.5, 0.25, 0.0], [0.5, 0.0, 0.25], [0.0, 0.5, 0.25]];
+    let corners: Vec<[f32; 3]> = (0..300).flat_map(|i| [if i % 4 == 0 { thorn(i) } else { equal }, shell(i), equal]).flatten().collect();
+    let triangles = (0..corners.len() as u32 / 3).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    MeshTree::build(corners, triangles)
+}
+
+fn hash(tree: &MeshTree) -> [u8; 32] {
+    let mut identity = Identity::new();
+    tree.identify(&mut identity);
+    identity.finish()
+}
+
 /// A wavy patch of 12 x 12 squares with smooth normals and texture coordinates.
 fn bumps() -> MeshData {
     const SIDE: u32 = 12;
@@ -143,12 +176,40 @@ fn stripes() -> Result<Vec<u8>, io::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::accel::LeafRule;
+
+    fn hex(hash: [u8; 32]) -> String {
+        hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    }
+
+    fn compiled(seed: u64) -> scene::Scene {
+        let (frame, assets) = canary(seed).unwrap();
+        scene::Scene::compile(&frame, &assets).unwrap()
+    }
 
     /// The first node of a farm sets what the others must agree with, so this hash may change, but only together with [`crate::REVISION`].
     #[test]
     fn the_hash_is_that_of_this_revision() {
-        let hex: String = canary_hash(1).unwrap().iter().map(|byte| format!("{byte:02x}")).collect();
-        assert_eq!((crate::REVISION, hex.as_str()), (1, "ba8761be3e1d9dce976bdfdfb9f4d972aae0826b8f330e198a7da0745b1ed423"));
+        let pixels = hex(pixels(&compiled(1)).unwrap());
+        assert_eq!((crate::REVISION, pixels.as_str()), (1, "ba8761be3e1d9dce976bdfdfb9f4d972aae0826b8f330e198a7da0745b1ed423"));
+    }
+
+    /// Other trees are another build to a farm, though no picture tells: these hashes may change at any time, but not unnoticed, and not by machine.
+    #[test]
+    fn trees_are_those_of_this_build() {
+        assert!(thicket().is_split());
+        assert_eq!(hex(compiled(1).tree_hash()), "0509f035d1a24901c4e8ef0069f25f732f964707342b115bc520df2be0246f36");
+        assert_eq!(hex(hash(&thicket())), "d89a16478882866585fb41b35bf4741ad0a05d1c6761351b2529270fd76d44e6");
+    }
+
+    /// Leaves of fewer triangles: the same pixels, but not the same node.
+    #[test]
+    fn another_tree_is_another_hash_of_the_same_pixels() {
+        let (usual, other) = (compiled(1), compiled(1).with_leaves(LeafRule { most: 2, cost: 1.0 }));
+        assert_eq!(pixels(&usual).unwrap(), pixels(&other).unwrap());
+        assert_ne!(usual.tree_hash(), other.tree_hash());
+        assert_eq!(usual.tree_hash(), compiled(2).tree_hash());
+        assert_ne!(proof(&usual).unwrap(), proof(&other).unwrap());
     }
 
     #[test]

@@ -3,6 +3,7 @@
 mod compile;
 mod error;
 mod geometry;
+mod identity;
 mod place;
 mod query;
 mod statistics;

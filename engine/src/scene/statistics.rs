@@ -23,6 +23,8 @@ pub struct Statistics {
     pub instanced_triangles: usize,
     /// Memory of meshes and trees in bytes.
     pub bytes: usize,
+    /// Nodes on the longest way through the tree of any mesh.
+    pub depth: usize,
 }
 
 impl Statistics {
@@ -41,6 +43,7 @@ impl Statistics {
             bytes: geometry.meshes.iter().map(|mesh| mesh.bytes()).sum::<usize>()
                 + geometry.tree.as_ref().map_or(0, |tree| tree.bytes())
                 + geometry.list.as_ref().map_or(0, |list| list.bytes()),
+            depth: geometry.meshes.iter().map(|mesh| mesh.tree.depth()).max().unwrap_or(0),
         }
     }
 }

@@ -44,7 +44,12 @@ impl<'a> Geometry<'a> {
             warnings.object("mesh", format!("{name:?}"), "has no positions; left out");
             return Ok(None);
         };
-        let mut triangles = self.triangles(primitive, mode, positions.count)?;
+        let (mut triangles, flat) = self.triangles(primitive, mode, positions.count)?;
+        // Strips are stitched with such triangles.
+        if flat > 0 && mode == Mode::Triangles {
+            let text = format!("triangles that name a vertex twice have no area; left out ({flat})");
+            warnings.object("mesh", format!("{name:?}"), text);
+        }
         if triangles.is_empty() {
             return Ok(None);
         }
@@ -118,8 +123,8 @@ impl<'a> Geometry<'a> {
         Reader::new(&self.root.accessors, self.buffers, index, types)
     }
 
-    /// Triangles as indices below `count`, without those that have no area because they name a vertex twice.
-    fn triangles(&mut self, primitive: &Primitive, mode: Mode, count: usize) -> Result<Vec<[u32; 3]>, AssetError> {
+    /// Triangles as indices below `count`, without those that have no area because they name a vertex twice, and the number of these.
+    fn triangles(&mut self, primitive: &Primitive, mode: Mode, count: usize) -> Result<(Vec<[u32; 3]>, usize), AssetError> {
         let reader = primitive.indices.map(|index| self.reader(index, &[Type::Scalar])).transpose().context(|| "indices".into())?;
         if reader.as_ref().is_some_and(|reader| !reader.is_unsigned()) {
             return Err(AssetError::new("its indices are not unsigned integers"));
@@ -158,7 +163,8 @@ impl<'a> Geometry<'a> {
                 triangles.push([a, b, c]);
             }
         }
-        Ok(triangles)
+        let flat = number - triangles.len();
+        Ok((triangles, flat))
     }
 }
 

@@ -64,7 +64,8 @@ fn check_streams(scene: &mut Scene, rays: &[Ray]) {
     }
 }
 
-fn check(scene: &mut Scene, rays: &[Ray]) {
+/// Holds a scene's answers against brute force, for both vector widths.
+pub fn check(scene: &mut Scene, rays: &[Ray]) {
     check_streams(scene, rays);
     for ray in rays {
         let expected = nearest(&scene.geometry, ray);

@@ -1,6 +1,7 @@
 //! Scenes as users make them, held against brute force and closed forms.
 
 mod brute_force;
+mod builds;
 mod errors;
 mod meshes;
 mod pencils;

@@ -1,0 +1,24 @@
+//! What all trees of a scene are, in 32 bytes.
+
+use super::Scene;
+use crate::accel::Identity;
+
+impl Scene {
+    /// Equal for scenes whose trees are equal to the last bit, on every machine; others differ. Pictures do not depend on it, except where rays hit several
+    /// things at equal distances, but time does.
+    pub fn tree_hash(&self) -> [u8; 32] {
+        let mut identity = Identity::new();
+        if let Some(tree) = &self.geometry.tree {
+            tree.identify(&mut identity);
+        }
+        self.geometry.meshes.iter().for_each(|mesh| mesh.tree.identify(&mut identity));
+        identity.finish()
+    }
+
+    /// The same scene with other leaves in the trees of its meshes.
+    #[cfg(test)]
+    pub(crate) fn with_leaves(mut self, rule: crate::accel::LeafRule) -> Self {
+        self.geometry.meshes.iter_mut().for_each(|mesh| mesh.tree = mesh.tree.with_leaves(rule));
+        self
+    }
+}
