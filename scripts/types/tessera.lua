@@ -178,7 +178,7 @@ function tessera.disc(keys) end
 ---@field transform? tessera.Transform places it
 ---@field name? string for messages
 
----A flat rectangle, or a parallelogram where its edges are not perpendicular, from a corner or about its center. Its front is where edge_v turns left of edge_u; with both as right and up, an image is seen upright there. Its uv run from 0 to 1, u along edge_u, v against edge_v.
+---A flat rectangle, or a parallelogram where its edges are not perpendicular, from a corner or about its center. Seen from its front, edge_v is counter-clockwise from edge_u; where they point up and right, an image stands upright. Its uv run from 0 to 1, u along edge_u, v against edge_v.
 ---@param keys tessera.RectangleKeys
 ---@return tessera.Object
 function tessera.rectangle(keys) end

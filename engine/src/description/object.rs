@@ -88,8 +88,8 @@ pub enum Shape {
         /// The coded mesh.
         data: AssetId,
     },
-    /// A flat parallelogram, a rectangle where its edges are perpendicular. Its front is where `edge_v` is to the left of `edge_u`. Its uv run from 0 to 1, u along
-    /// `edge_u`, v against `edge_v`: seen from the front, with `edge_u` to the right, v = 0 lies at the top.
+    /// A flat parallelogram, a rectangle where its edges are perpendicular. Seen from its front, `edge_v` is counter-clockwise
+    /// from `edge_u`. Its uv run from 0 to 1, u along `edge_u`, v against `edge_v`: where that points up, v = 0 lies at the top.
     Rectangle {
         /// Where both edges begin.
         corner: [f64; 3],

@@ -394,6 +394,8 @@ fn cylinder(ends: [[f64; 3]; 2], radius: f64, capped: bool, source: SourceId) ->
 fn cone(what: &str, [from, to]: [[f64; 3]; 2], radii: [f64; 2], capped: bool, source: SourceId) -> Result<Cone> {
     let wrong = |message: String| CompileError::new(source, message);
     let (from, to) = (finite(from, &format!("the {what}'s from"), source)?, finite(to, &format!("the {what}'s to"), source)?);
+    let between = std::array::from_fn(|i| to[i] - from[i]);
+    finite(between, &format!("the {what}'s length"), source)?;
     let [radius, to_radius] = radii;
     if !(radii.iter().all(|radius| *radius >= 0.0 && radius.is_finite()) && radius + to_radius > 0.0) {
         let message = format!("the {what}'s radius and to_radius must be 0 or above, and not both 0: they are {radius} and {to_radius}");
