@@ -168,6 +168,27 @@ fn distant_rays_are_hit_as_without_a_tree() {
     check(&mut scene, &rays);
 }
 
+/// Their boxes are as flat as they are, and no flatter; rays pass along them.
+#[test]
+fn slightly_tilted_discs_and_cylinders_are_hit_as_without_a_tree() {
+    let (mut random, mut maker, mut rays) = (Random(17), Maker::default(), Vec::new());
+    for i in 0..40 {
+        let tilt = 2e-8 * random.unit();
+        let (center, normal) = (DVec3::new(0.0, f64::from(i % 2), 0.0), DVec3::new(-tilt, 1.0, 0.0));
+        let radius = 1.0 + random.unit();
+        if i % 4 < 2 {
+            maker.add(Shape::Disc { center: center.into(), normal: normal.into(), radius }, DAffine3::IDENTITY);
+        } else {
+            let to = center + normal * 0.25;
+            maker.add(Shape::Cylinder { from: center.into(), to: to.into(), radius, capped: true }, DAffine3::IDENTITY);
+        }
+        // Through the disc not far from its highest point, and just below the cylinder's first end.
+        let height = center.y + radius * tilt * (random.unit() * 2.0 - 1.0);
+        rays.extend([-5.0, 5.0].map(|x: f64| Ray::new(DVec3::new(x, height, 0.1), DVec3::X.copysign(DVec3::splat(-x)) * DVec3::X)));
+    }
+    check(&mut maker.compile(), &rays);
+}
+
 /// Every bit of every surface is the same with either vector width.
 #[test]
 fn vector_widths_give_the_same_bits() {
