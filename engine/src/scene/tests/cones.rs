@@ -154,7 +154,7 @@ fn given(random: &mut Random) -> Given {
         3 => radius,
         _ => radius * random.unit(),
     };
-    Given { from, to, radii: if random.bits() % 2 == 0 { [radius, other] } else { [other, radius] } }
+    Given { from, to, radii: if random.bits().is_multiple_of(2) { [radius, other] } else { [other, radius] } }
 }
 
 /// A point of the body, of its axis, near a silhouette, or very near an end's middle, where an apex may be.
@@ -272,7 +272,7 @@ fn points_of_cones_lie_within_their_bound() {
         let target = aim(&given, &mut random);
         let direction = random.direction() * exp2(f64::from(random.bits() % 80) - 40.0);
         let ray = Ray::new(target - direction.normalize() * given.size() * pow(10.0, 12.0 * random.unit()), direction);
-        let cone = given.cone(random.bits() % 2 == 0);
+        let cone = given.cone(random.bits().is_multiple_of(2));
         let Some((t, part)) = cone.closest(&ray) else { continue };
         let point = cone.point(&ray, t, part, false);
         let there = given.outside(&Ray::new(point.position, DVec3::ZERO), 0.0);

@@ -173,8 +173,8 @@ pub fn everything(seed: u64, count: usize) -> Maker {
             }
             6 => {
                 let to = center + random.direction() * (0.1 + random.unit());
-                let to_radius = if random.bits() % 2 == 0 { 0.0 } else { random.unit() };
-                Shape::Cone { from: center.into(), to: to.into(), radius, to_radius, capped: random.bits() % 2 == 0 }
+                let to_radius = if random.bits().is_multiple_of(2) { 0.0 } else { random.unit() };
+                Shape::Cone { from: center.into(), to: to.into(), radius, to_radius, capped: random.bits().is_multiple_of(2) }
             }
             _ => {
                 maker.mesh(&ball, placement(&mut random));

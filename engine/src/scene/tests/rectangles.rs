@@ -30,7 +30,7 @@ fn rectangles_are_hit_as_their_triangles_are() {
         let [corner, u, v] = [random.point(), random.point(), random.point()].map(|p| (p * 1024.0).round() / 1024.0);
         let corners = [corner, corner + u, corner + u + v, corner + v].map(|p| p.as_vec3().to_array());
         let mesh = MeshData { positions: corners.to_vec(), triangles: vec![[0, 1, 2], [0, 2, 3]], ..Default::default() };
-        let map = if random.bits() % 2 == 0 { DAffine3::IDENTITY } else { placement(&mut random) };
+        let map = if random.bits().is_multiple_of(2) { DAffine3::IDENTITY } else { placement(&mut random) };
         let flat = Shape::Rectangle { corner: corner.into(), edge_u: u.into(), edge_v: v.into() };
         let (flat, mesh) = (Maker::default().add(flat, map).compile(), Maker::default().mesh(&mesh, map).compile());
         for _ in 0..200 {
