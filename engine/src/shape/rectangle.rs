@@ -66,7 +66,7 @@ impl Rectangle {
     /// right, v = 0 lies at the top, and the normal points at the viewer.
     pub fn point(&self, ray: &Ray, t: f64) -> Point {
         let p = (ray.origin - self.corner) + ray.direction * t;
-        let along = |i: usize| (self.across[i].dot(p) / self.widths[i]).clamp(0.0, 1.0);
+        let along = |i: usize| self.across[i].dot(p) / self.widths[i];
         let (a, b) = (along(0), along(1));
         let position = self.corner + self.edges[0] * a + self.edges[1] * b;
         let error = 16.0 * UNIT * (max_abs(position) + max_abs(self.corner) + self.reach);

@@ -222,6 +222,33 @@ fn an_apex_is_met_as_accurately_as_its_coordinates_allow() {
     }
 }
 
+/// Rays through an apex into the cone, steeper than its side, down to those along its axis: where they meet it, rounding alone decides between the side and the plane of that end.
+#[test]
+fn an_apex_has_no_hole() {
+    let mut random = Random(34);
+    for _ in 0..20_000 {
+        let (apex, axis) = (random.point(), random.direction());
+        let given = Given { from: apex + axis, to: apex, radii: [0.1 + random.unit(), 0.0] };
+        let beside = 0.9 * pow(10.0, -20.0 * random.unit());
+        let within = given.from + axis.cross(random.direction()).normalize() * given.radii[0] * beside;
+        let direction = (within - apex).normalize();
+        let ray = Ray::new(apex - direction * 4.0, direction);
+        let hit = given.cone(false).closest(&ray);
+        assert!(hit.is_some_and(|(t, _)| (t - 4.0).abs() < 1e-13), "{hit:?} {given:?} {ray:?}");
+    }
+}
+
+/// By a power of two, so that nothing is rounded.
+#[test]
+fn cones_are_scaled_as_a_whole() {
+    let mut random = Random(35);
+    for _ in 0..1_000 {
+        let Given { from, to, radii } = given(&mut random);
+        let large = Cone::new([from * 4.0, to * 4.0], radii.map(|radius| radius * 4.0), true);
+        assert_eq!(Some(Cone::new([from, to], radii, true).unwrap().moved(4.0, DVec3::ZERO)), large);
+    }
+}
+
 /// Rays along the axis and through the apex, where most terms vanish.
 #[test]
 fn crossings_of_simple_cones_are_exact() {
@@ -278,6 +305,10 @@ fn points_of_cones_lie_within_their_bound() {
         let there = given.outside(&Ray::new(point.position, DVec3::ZERO), 0.0);
         assert!(there.abs() <= point.error / 2.0, "{there:e} {point:?} {given:?} {ray:?}");
         assert!((point.normal.length() - 1.0).abs() < 8.0 * UNIT);
+        if cone.is_cylinder() && part == 0 {
+            let along = point.normal.dot((given.to - given.from).normalize());
+            assert!(along.abs() < 8.0 * UNIT, "{along:e} {given:?}");
+        }
         worst = worst.max(there.abs() / point.error);
         // The normal points out, where the other side is not too near to tell.
         let ahead = given.outside(&Ray::new(point.position, point.normal), 1e-4 * given.size());

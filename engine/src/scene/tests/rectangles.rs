@@ -49,6 +49,36 @@ fn rectangles_are_hit_as_their_triangles_are() {
     assert!(hits > 10_000, "{hits}");
 }
 
+/// Also where a ray comes from so far away that it is rounded beyond an edge.
+#[test]
+fn points_of_rectangles_lie_on_them() {
+    let mut random = Random(43);
+    let mut hits = 0;
+    for _ in 0..20_000 {
+        let (corner, u, v) = (random.point(), random.direction(), random.direction());
+        let rectangle = Rectangle::new(corner, u, v).unwrap();
+        let target = corner + u * f64::from(random.bits() % 2) + v * random.unit();
+        let direction = random.direction();
+        let ray = Ray::new(target - direction * 1e8 * random.unit(), direction);
+        let Some(t) = rectangle.closest(&ray) else { continue };
+        let point = rectangle.point(&ray, t);
+        assert!(point.uv.cmpge(glam::DVec2::ZERO).all() && point.uv.cmple(glam::DVec2::ONE).all(), "{point:?}");
+        let expected = corner + u * point.uv.x + v * (1.0 - point.uv.y);
+        assert!((point.position - expected).length() < 1e-15 && (point.position - ray.at(t)).length() < 1e-6 / u.cross(v).length());
+        hits += 1;
+    }
+    assert!(hits > 5_000, "{hits}");
+}
+
+/// By a power of two, so that nothing is rounded.
+#[test]
+fn rectangles_are_scaled_as_a_whole() {
+    let mut random = Random(44);
+    let [corner, u, v] = [random.point(), random.point(), random.point()];
+    let large = Rectangle::new(corner * 4.0, u * 4.0, v * 4.0);
+    assert_eq!(Some(Rectangle::new(corner, u, v).unwrap().moved(4.0, DVec3::ZERO)), large);
+}
+
 /// Texture coordinates run along the edges, whatever their angle.
 #[test]
 fn texture_coordinates_of_rectangles_are_those_of_their_corners() {
