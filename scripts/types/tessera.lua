@@ -168,6 +168,52 @@ function tessera.box(keys) end
 ---@return tessera.Object
 function tessera.disc(keys) end
 
+-- @api rectangle
+---@class tessera.RectangleKeys
+---@field corner? tessera.Vec3 where both edges begin
+---@field center? tessera.Vec3 middle, instead of corner
+---@field edge_u tessera.Vec3 one edge
+---@field edge_v tessera.Vec3 the other, not parallel to it
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---A flat rectangle, or a parallelogram where its edges are not perpendicular, from a corner or about its center. Seen from its front, edge_v is counter-clockwise from edge_u; where they point up and right, an image stands upright. Its uv run from 0 to 1, u along edge_u, v against edge_v.
+---@param keys tessera.RectangleKeys
+---@return tessera.Object
+function tessera.rectangle(keys) end
+
+-- @api cylinder
+---@class tessera.CylinderKeys
+---@field from? tessera.Vec3 middle of one end
+---@field to? tessera.Vec3 middle of the other end
+---@field radius? number radius
+---@field capped? boolean whether discs close the ends
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---A round cylinder. The uv of its side are longitude about the axis (with `to` up, 0.5 faces +z, or +y where it lies along z) and the place along it, v = 0 at `to`; those of its ends are a disc's.
+---@param keys tessera.CylinderKeys
+---@return tessera.Object
+function tessera.cylinder(keys) end
+
+-- @api cone
+---@class tessera.ConeKeys
+---@field from? tessera.Vec3 middle of one end
+---@field to? tessera.Vec3 middle of the other end
+---@field radius? number radius at from
+---@field to_radius? number radius at to; 0 is an apex
+---@field capped? boolean whether discs close the ends
+---@field material tessera.Material what it is made of
+---@field transform? tessera.Transform places it
+---@field name? string for messages
+
+---A round cone; truncated, if no radius is 0. Its uv are those of a cylinder.
+---@param keys tessera.ConeKeys
+---@return tessera.Object
+function tessera.cone(keys) end
+
 -- @api mesh
 ---@class tessera.MeshKeys
 ---@field positions tessera.Vec3[]|buffer vertices

@@ -88,6 +88,41 @@ pub enum Shape {
         /// The coded mesh.
         data: AssetId,
     },
+    /// A flat parallelogram, a rectangle where its edges are perpendicular. Seen from its front, `edge_v` is counter-clockwise
+    /// from `edge_u`. Its uv run from 0 to 1, u along `edge_u`, v against `edge_v`: where that points up, v = 0 lies at the top.
+    Rectangle {
+        /// Where both edges begin.
+        corner: [f64; 3],
+        /// From there to the next corner: any length but 0.
+        edge_u: [f64; 3],
+        /// From there to the other next corner: any length but 0, and not parallel to `edge_u`.
+        edge_v: [f64; 3],
+    },
+    /// A round cylinder. Its uv are those of a cone.
+    Cylinder {
+        /// Middle of one end.
+        from: [f64; 3],
+        /// Middle of the other end, elsewhere than `from`.
+        to: [f64; 3],
+        /// Above 0.
+        radius: f64,
+        /// Whether discs close its ends.
+        capped: bool,
+    },
+    /// A round cone, whole or truncated. The uv of its side are longitude about the axis and the place between the ends, v = 0 at `to`, each in [0, 1];
+    /// those of its ends are a disc's.
+    Cone {
+        /// Middle of one end.
+        from: [f64; 3],
+        /// Middle of the other end, elsewhere than `from`.
+        to: [f64; 3],
+        /// Radius at `from`: 0, for an apex, or above.
+        radius: f64,
+        /// Radius at `to`: 0, for an apex, or above; not both are 0.
+        to_radius: f64,
+        /// Whether discs close its ends.
+        capped: bool,
+    },
 }
 
 /// A model file and the files that it refers to.

@@ -73,6 +73,13 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
             shape(Shape::Sphere { center: [0.9, 0.4, 0.3], radius: 0.4 }, 3, None),
             shape(Shape::Box { min: [-1.0, 0.0, -0.4], max: [-0.6, 0.9, 0.2] }, 1, Some(turned(0.6, 0.8, [0.1, 0.0, 0.2]))),
             shape(Shape::Disc { center: [0.2, 1.3, -0.2], normal: [0.2, 1.0, 0.4], radius: 0.45 }, 2, None),
+            shape(Shape::Rectangle { corner: [-1.7, 0.1, -0.9], edge_u: [0.6, 0.0, 0.3], edge_v: [0.0, 1.1, -0.1] }, 1, None),
+            shape(Shape::Cylinder { from: [0.6, 0.0, 1.1], to: [1.3, 0.3, 1.3], radius: 0.2, capped: false }, 1, None),
+            shape(
+                Shape::Cone { from: [-0.4, 0.0, 0.9], to: [-0.3, 0.8, 0.8], radius: 0.35, to_radius: 0.0, capped: true },
+                3,
+                Some([[1.0, 0.2, 0.0, 0.0], [0.0, 0.9, 0.0, 0.0], [0.0, 0.0, 0.7, 0.3]]),
+            ),
         ],
     };
     let world = Group {
@@ -187,18 +194,18 @@ mod tests {
         scene::Scene::compile(&frame, &assets).unwrap()
     }
 
-    /// The first node of a farm sets what the others must agree with, so this hash may change, but only together with [`crate::REVISION`].
+    /// The first node of a farm sets what the others must agree with, so this hash may change, but only together with [`crate::REVISION`] or with what the frame shows.
     #[test]
     fn the_hash_is_that_of_this_revision() {
         let pixels = hex(pixels(&compiled(1)).unwrap());
-        assert_eq!((crate::REVISION, pixels.as_str()), (1, "ba8761be3e1d9dce976bdfdfb9f4d972aae0826b8f330e198a7da0745b1ed423"));
+        assert_eq!((crate::REVISION, pixels.as_str()), (1, "1be36018d7dcc2aae0cf91b91fce89365eab1822a4b5afe23306c47d5ecf9933"));
     }
 
     /// Other trees are another build to a farm, though no picture tells: these hashes may change at any time, but not unnoticed, and not by machine.
     #[test]
     fn trees_are_those_of_this_build() {
         assert!(thicket().is_split());
-        assert_eq!(hex(compiled(1).tree_hash()), "0509f035d1a24901c4e8ef0069f25f732f964707342b115bc520df2be0246f36");
+        assert_eq!(hex(compiled(1).tree_hash()), "f8f544039464a3ac8b8c27bf42dee3e1495149eb2bbeb885f323d8665bff562e");
         assert_eq!(hex(hash(&thicket())), "d89a16478882866585fb41b35bf4741ad0a05d1c6761351b2529270fd76d44e6");
     }
 
@@ -215,6 +222,25 @@ mod tests {
     #[test]
     fn another_seed_is_another_hash() {
         assert_ne!(canary_hash(1).unwrap(), canary_hash(2).unwrap());
+    }
+
+    /// Each of them is seen: without any one of them it is another picture.
+    #[test]
+    fn every_object_of_the_canary_counts() {
+        let (frame, assets) = canary(1).unwrap();
+        let hash = |frame: &Frame| {
+            let scene = scene::Scene::compile(frame, &assets).unwrap();
+            let rect = Rect { x: 0, y: 0, width: frame.film.width, height: frame.film.height };
+            render(&scene, rect, SampleRange { first: 0, count: 1 }, &AtomicBool::new(false)).unwrap().hash()
+        };
+        let whole = hash(&frame);
+        for (group, objects) in frame.scene.groups.iter().map(|group| group.objects.len()).enumerate() {
+            for object in 0..objects {
+                let mut without = frame.clone();
+                let gone = without.scene.groups[group].objects.remove(object);
+                assert_ne!(hash(&without), whole, "{gone:?}");
+            }
+        }
     }
 
     /// A canary that shows only sky would prove nothing: everything in it is met by rays.

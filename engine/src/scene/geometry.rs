@@ -6,7 +6,7 @@ use crate::{
     accel::{LeafRule, MOST_LISTED_SPHERES, MeshHit, MeshTree, Pencil, Simd, SphereList, Tree},
     light::Light,
     math::{UNIT, max_abs},
-    shape::{Bounds, Cuboid, Disc, Plane, Ray, Sphere, triangle::geometric_normal},
+    shape::{Bounds, Cuboid, Disc, Other, Plane, Ray, Sphere, triangle::geometric_normal},
 };
 
 /// A shape in world coordinates.
@@ -35,6 +35,7 @@ pub enum LocalShape {
     Sphere(Sphere),
     Cuboid(Cuboid),
     Disc(Disc),
+    Other(Other),
 }
 
 /// A transformed shape.
@@ -71,6 +72,7 @@ pub mod kind {
     pub const MESH: u32 = 4;
     /// Planes stand outside the tree.
     pub const PLANE: u32 = 5;
+    pub const OTHER: u32 = 6;
     /// Bits of the index.
     pub const SHIFT: u32 = 28;
     pub const INDEX: u32 = (1 << SHIFT) - 1;
@@ -83,6 +85,7 @@ pub struct Geometry {
     pub spheres: Vec<Placed<Sphere>>,
     pub cuboids: Vec<Placed<Cuboid>>,
     pub discs: Vec<Placed<Disc>>,
+    pub others: Vec<Placed<Other>>,
     pub transformed: Vec<Placed<Transformed>>,
     pub instances: Vec<Placed<Instance>>,
     pub meshes: Vec<Mesh>,
@@ -119,6 +122,7 @@ impl Geometry {
         add(kind::SPHERE, &mut spheres.iter().filter(|_| !few).map(Sphere::bounds));
         add(kind::CUBOID, &mut self.cuboids.iter().map(|s| s.shape.bounds()));
         add(kind::DISC, &mut self.discs.iter().map(|s| s.shape.bounds()));
+        add(kind::OTHER, &mut self.others.iter().map(|s| s.shape.bounds()));
         add(kind::TRANSFORMED, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
         add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds(self.meshes[s.shape.mesh as usize].tree.bounds())));
         let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
@@ -134,6 +138,7 @@ impl LocalShape {
             Self::Sphere(shape) => shape.bounds(),
             Self::Cuboid(shape) => shape.bounds(),
             Self::Disc(shape) => shape.bounds(),
+            Self::Other(shape) => shape.bounds(),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::{
     light::Light,
     material::Material,
     math::max_abs,
-    shape::{Bounds, Cuboid, Disc, Plane, Sphere},
+    shape::{Bounds, Cone, Cuboid, Disc, Other, Plane, Rectangle, Sphere},
     texture::Texture,
 };
 
@@ -63,6 +63,7 @@ impl<'a> Placer<'a> {
             spheres: Vec::new(),
             cuboids: Vec::new(),
             discs: Vec::new(),
+            others: Vec::new(),
             transformed: Vec::new(),
             instances: Vec::new(),
             meshes: Vec::new(),
@@ -192,6 +193,17 @@ impl<'a> Placer<'a> {
                 };
                 self.instance(mesh, material, transform, source)
             }
+            Shape::Rectangle { corner, edge_u, edge_v } => {
+                self.solid(LocalShape::Other(Other::Rectangle(rectangle(corner, [edge_u, edge_v], source)?)), material, transform, source)
+            }
+            Shape::Cylinder { from, to, radius, capped } => {
+                let cylinder = cylinder([from, to], radius, capped, source)?;
+                self.solid(LocalShape::Other(Other::Cone(cylinder)), material, transform, source)
+            }
+            Shape::Cone { from, to, radius, to_radius, capped } => {
+                let cone = cone("cone", [from, to], [radius, to_radius], capped, source)?;
+                self.solid(LocalShape::Other(Other::Cone(cone)), material, transform, source)
+            }
         }
     }
 
@@ -216,6 +228,9 @@ impl<'a> Placer<'a> {
             }
             LocalShape::Disc(Disc { center, normal, radius }) => {
                 geometry.discs.push(Placed { shape: Disc { center: moved(center), normal, radius: radius * scale }, object, material });
+            }
+            LocalShape::Other(other) => {
+                geometry.others.push(Placed { shape: other.moved(scale, translation), object, material });
             }
         }
         Ok(())
@@ -350,11 +365,43 @@ fn finite(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
     if v.is_finite() { Ok(v) } else { Err(CompileError::new(source, format!("{what} is not finite"))) }
 }
 
-/// A vector that has a direction, made a unit vector.
-fn unit(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
+/// A vector that has a direction.
+fn direction(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
     let v = finite(v, what, source)?;
-    let size = max_abs(v);
-    if size > 0.0 { Ok((v / size).normalize()) } else { Err(CompileError::new(source, format!("{what} is 0"))) }
+    if v != DVec3::ZERO { Ok(v) } else { Err(CompileError::new(source, format!("{what} is 0"))) }
+}
+
+/// The same, made a unit vector.
+fn unit(v: [f64; 3], what: &str, source: SourceId) -> Result<DVec3> {
+    let v = direction(v, what, source)?;
+    Ok((v / max_abs(v)).normalize())
+}
+
+fn rectangle(corner: [f64; 3], [u, v]: [[f64; 3]; 2], source: SourceId) -> Result<Rectangle> {
+    let corner = finite(corner, "the rectangle's corner", source)?;
+    let (u, v) = (direction(u, "the rectangle's edge_u", source)?, direction(v, "the rectangle's edge_v", source)?);
+    Rectangle::new(corner, u, v).ok_or_else(|| CompileError::new(source, "the rectangle's edge_u and edge_v are parallel"))
+}
+
+fn cylinder(ends: [[f64; 3]; 2], radius: f64, capped: bool, source: SourceId) -> Result<Cone> {
+    if !(radius > 0.0 && radius.is_finite()) {
+        return Err(CompileError::new(source, format!("the cylinder's radius must be above 0, not {radius}")));
+    }
+    cone("cylinder", ends, [radius; 2], capped, source)
+}
+
+/// A cone, or a cylinder whose radius has been checked.
+fn cone(what: &str, [from, to]: [[f64; 3]; 2], radii: [f64; 2], capped: bool, source: SourceId) -> Result<Cone> {
+    let wrong = |message: String| CompileError::new(source, message);
+    let (from, to) = (finite(from, &format!("the {what}'s from"), source)?, finite(to, &format!("the {what}'s to"), source)?);
+    let between = std::array::from_fn(|i| to[i] - from[i]);
+    finite(between, &format!("the {what}'s length"), source)?;
+    let [radius, to_radius] = radii;
+    if !(radii.iter().all(|radius| *radius >= 0.0 && radius.is_finite()) && radius + to_radius > 0.0) {
+        let message = format!("the {what}'s radius and to_radius must be 0 or above, and not both 0: they are {radius} and {to_radius}");
+        return Err(wrong(message));
+    }
+    Cone::new([from, to], radii, capped).ok_or_else(|| wrong(format!("the {what}'s from and to are the same point")))
 }
 
 fn check_mesh(data: &MeshData) -> std::result::Result<(), String> {

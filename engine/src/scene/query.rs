@@ -24,7 +24,7 @@ pub struct Hit {
     pub t: f64,
     /// Place of the object in the order of the scene.
     pub object: u32,
-    /// Triangle of a mesh, face of a box; 0 on everything else.
+    /// Triangle of a mesh, face of a box, side or end of a cone; 0 on everything else.
     pub part: u32,
     /// Kind and index of the shape.
     reference: u32,
@@ -262,9 +262,16 @@ impl Scene {
                         LocalShape::Sphere(sphere) => sphere.closest::<false>(&local).map(|t| (t, 0)),
                         LocalShape::Cuboid(cuboid) => cuboid.closest(&local),
                         LocalShape::Disc(disc) => disc.closest(&local).map(|t| (t, 0)),
+                        LocalShape::Other(other) => other.closest(&local),
                     };
                     if let Some((t, part)) = hit {
                         best.offer(simple(t, placed.object, part));
+                    }
+                }
+                kind::OTHER => {
+                    let other = &geometry.others[index];
+                    if let Some((t, part)) = other.shape.closest(ray) {
+                        best.offer(simple(t, other.object, part));
                     }
                 }
                 _ => {
@@ -357,8 +364,13 @@ impl Scene {
                         LocalShape::Sphere(sphere) => sphere.crossings::<false>(local.origin, local.direction),
                         LocalShape::Cuboid(cuboid) => cuboid.crossings(local.origin, local.direction).map(|[near, far]| [near.0, far.0]),
                         LocalShape::Disc(disc) => disc.closest(&local).map(|t| [t, f64::INFINITY]),
+                        LocalShape::Other(other) => other.crossings(&local),
                     };
                     crossings.is_some_and(|[near, far]| blocked(placed.material, near) || blocked(placed.material, far))
+                }
+                kind::OTHER => {
+                    let other = &geometry.others[index];
+                    other.shape.crossings(ray).is_some_and(|[near, far]| blocked(other.material, near) || blocked(other.material, far))
                 }
                 _ => {
                     // SAFETY: the caller has the instructions of `L`.
@@ -443,6 +455,11 @@ impl Scene {
                 let plane = &geometry.planes[index];
                 in_world(plane.shape.point(ray, hit.t), hit.t, plane.material)
             }
+            kind::OTHER => {
+                let other = &geometry.others[index];
+                let textured = self.is_textured(other.material);
+                in_world(other.shape.point(ray, hit.t, hit.part, textured), hit.t, other.material)
+            }
             kind::TRANSFORMED => self.transformed_surface(ray, hit, index),
             _ => self.mesh_surface(hit, index),
         })
@@ -457,6 +474,7 @@ impl Scene {
             LocalShape::Sphere(sphere) => sphere.point(&local, hit.t),
             LocalShape::Cuboid(cuboid) => cuboid.point(&local, hit.t, hit.part),
             LocalShape::Disc(disc) => disc.point(&local, hit.t),
+            LocalShape::Other(other) => other.point(&local, hit.t, hit.part, self.is_textured(placed.material)),
         };
         if matches!(placed.shape.shape, LocalShape::Sphere(_)) {
             self.add_sphere_uv(&mut point, placed.material);
@@ -482,15 +500,20 @@ impl Scene {
             // Perpendicular, zero or NaN.
             _ => ng,
         };
-        let uv = if self.materials[placed.material as usize].texture().is_some() { mesh.uv(&at) } else { DVec2::ZERO };
+        let uv = if self.is_textured(placed.material) { mesh.uv(&at) } else { DVec2::ZERO };
         let error = transform.error(local.error, local.position, point);
         Surface { point, t: hit.t, error, ng, ns, uv, color: mesh.color(&at), material: placed.material, sphere: 0 }
+    }
+
+    #[inline(always)]
+    fn is_textured(&self, material: u32) -> bool {
+        self.materials[material as usize].texture().is_some()
     }
 
     /// Longitude and latitude cost more than the hit itself: only textures ask for them.
     #[inline(always)]
     fn add_sphere_uv(&self, point: &mut Point, material: u32) {
-        if self.materials[material as usize].texture().is_some() {
+        if self.is_textured(material) {
             point.uv = Sphere::uv(point.normal);
         }
     }

@@ -1,6 +1,7 @@
 //! What a scene is made of, in numbers.
 
 use super::geometry::{Geometry, LocalShape};
+use crate::shape::Other;
 
 /// Counts of a compiled scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -13,6 +14,12 @@ pub struct Statistics {
     pub boxes: usize,
     /// Discs, transformed ones included.
     pub discs: usize,
+    /// Rectangles, transformed ones included.
+    pub rectangles: usize,
+    /// Cylinders, transformed ones included.
+    pub cylinders: usize,
+    /// Cones, transformed ones included.
+    pub cones: usize,
     /// Different meshes.
     pub meshes: usize,
     /// Appearances of meshes.
@@ -30,12 +37,21 @@ pub struct Statistics {
 impl Statistics {
     pub(super) fn of(geometry: &Geometry) -> Self {
         let transformed = |is: fn(&LocalShape) -> bool| geometry.transformed.iter().filter(|placed| is(&placed.shape.shape)).count();
+        let placed = geometry.others.iter().map(|placed| &placed.shape);
+        let others = placed.chain(geometry.transformed.iter().filter_map(|placed| match &placed.shape.shape {
+            LocalShape::Other(other) => Some(other),
+            _ => None,
+        }));
+        let others = |is: fn(&Other) -> bool| others.clone().filter(|other| is(other)).count();
         let triangles = |mesh: u32| geometry.meshes[mesh as usize].tree.count();
         Self {
             spheres: geometry.spheres.len() + transformed(|shape| matches!(shape, LocalShape::Sphere(_))),
             planes: geometry.planes.len(),
             boxes: geometry.cuboids.len() + transformed(|shape| matches!(shape, LocalShape::Cuboid(_))),
             discs: geometry.discs.len() + transformed(|shape| matches!(shape, LocalShape::Disc(_))),
+            rectangles: others(|other| matches!(other, Other::Rectangle(_))),
+            cylinders: others(|other| matches!(other, Other::Cone(cone) if cone.is_cylinder())),
+            cones: others(|other| matches!(other, Other::Cone(cone) if !cone.is_cylinder())),
             meshes: geometry.meshes.len(),
             instances: geometry.instances.len(),
             triangles: geometry.meshes.iter().map(|mesh| mesh.tree.count()).sum(),

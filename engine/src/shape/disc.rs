@@ -19,8 +19,9 @@ pub struct Disc {
 impl Disc {
     /// The box around it: along an axis, a circle reaches `radius sin(angle between axis and normal)`.
     pub fn bounds(&self) -> Bounds {
-        let squared = DVec3::ONE - self.normal * self.normal;
-        let reach = squared.max(DVec3::ZERO).map(f64::sqrt) * self.radius;
+        let DVec3 { x, y, z } = self.normal * self.normal;
+        // Of the other two components: 1 - x^2 would lose a slight tilt.
+        let reach = DVec3::new(y + z, z + x, x + y).map(f64::sqrt) * self.radius;
         Bounds { min: self.center - reach, max: self.center + reach }
     }
 
@@ -37,9 +38,15 @@ impl Disc {
     pub fn point(&self, ray: &Ray, t: f64) -> Point {
         let position = self.flattened(ray.at(t));
         let error = 16.0 * UNIT * (max_abs(position) + max_abs(self.center));
+        Point { position, error, normal: self.normal, uv: self.uv(position) }
+    }
+
+    /// Texture coordinates of a point of the disc.
+    #[inline(always)]
+    pub fn uv(&self, position: DVec3) -> DVec2 {
         let (right, up) = self.axes();
         let across = (position - self.center) / (2.0 * self.radius);
-        Point { position, error, normal: self.normal, uv: DVec2::new(0.5 + across.dot(right), 0.5 - across.dot(up)) }
+        DVec2::new(0.5 + across.dot(right), 0.5 - across.dot(up))
     }
 
     fn flattened(&self, point: DVec3) -> DVec3 {

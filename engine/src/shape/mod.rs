@@ -3,17 +3,23 @@
 //! Every intersection reports hits with `0 < t < t_max`, and every point of a hit comes with a bound on its distance from the true surface,
 //! so that a ray that leaves it can start beyond the bound: there are no tolerances in scene units anywhere.
 
+pub mod cone;
 pub mod cuboid;
 pub mod disc;
+pub mod other;
 pub mod plane;
 mod ray;
+pub mod rectangle;
 pub mod sphere;
 pub mod triangle;
 
+pub use cone::Cone;
 pub use cuboid::Cuboid;
 pub use disc::Disc;
+pub use other::Other;
 pub use plane::Plane;
 pub use ray::Ray;
+pub use rectangle::Rectangle;
 pub use sphere::Sphere;
 
 use glam::{DVec2, DVec3};

@@ -63,6 +63,9 @@ struct Contents {
     planes: usize,
     boxes: usize,
     discs: usize,
+    rectangles: usize,
+    cylinders: usize,
+    cones: usize,
     meshes: usize,
     instances: usize,
     triangles: usize,
@@ -119,21 +122,24 @@ impl Summary {
 
 impl Contents {
     fn of(job: &LoadedJob, statistics: &Statistics) -> Self {
-        let Statistics { spheres, planes, boxes, discs, meshes, instances, triangles, instanced_triangles, bytes, .. } = *statistics;
+        let Statistics { spheres, planes, boxes, discs, rectangles, cylinders, cones, meshes, instances, triangles, .. } = *statistics;
         let scene = &job.description.frame.scene;
         Self {
             spheres,
             planes,
             boxes,
             discs,
+            rectangles,
+            cylinders,
+            cones,
             meshes,
             instances,
             triangles,
-            instanced_triangles,
+            instanced_triangles: statistics.instanced_triangles,
             lights: scene.lights.len(),
             materials: scene.materials.len(),
             textures: scene.textures.len(),
-            memory_bytes: bytes,
+            memory_bytes: statistics.bytes,
             assets: job.assets.iter().count(),
             asset_bytes: job.assets.iter().map(|(_, bytes)| bytes.len()).sum(),
         }
@@ -145,6 +151,9 @@ impl Contents {
             (self.planes, "plane", "planes"),
             (self.boxes, "box", "boxes"),
             (self.discs, "disc", "discs"),
+            (self.rectangles, "rectangle", "rectangles"),
+            (self.cylinders, "cylinder", "cylinders"),
+            (self.cones, "cone", "cones"),
             (self.meshes, "mesh", "meshes"),
             (self.instances, "instance of them", "instances of them"),
             (self.instanced_triangles, "triangle", "triangles"),

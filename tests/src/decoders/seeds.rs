@@ -215,6 +215,9 @@ fn frame() -> Frame {
         shape(Shape::Sphere { center: [0.0; 3], radius: 1.0 }, 2),
         shape(Shape::Box { min: [-1.0; 3], max: [0.5; 3] }, 1),
         shape(Shape::Disc { center: [0.0, 1.0, 0.0], normal: [0.0, 0.0, 1.0], radius: 0.5 }, 0),
+        shape(Shape::Rectangle { corner: [-1.0; 3], edge_u: [2.0, 0.0, 0.0], edge_v: [0.0, 1.0, 0.5] }, 1),
+        shape(Shape::Cylinder { from: [0.0; 3], to: [0.0, 1.0, 0.5], radius: 0.25, capped: false }, 2),
+        shape(Shape::Cone { from: [0.0, 1.0, 0.0], to: [0.0, 2.0, 0.0], radius: 0.5, to_radius: 0.0, capped: true }, 3),
     ];
     let outer = vec![
         object(ObjectKind::Instance { group: 0 }, turned),

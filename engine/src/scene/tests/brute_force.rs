@@ -17,12 +17,14 @@ fn nearest(geometry: &Geometry, ray: &Ray) -> Option<(f64, u32)> {
     hits.extend(geometry.spheres.iter().filter_map(|p| Some((p.shape.closest::<true>(ray)?, p.object))));
     hits.extend(geometry.cuboids.iter().filter_map(|p| Some((p.shape.closest(ray)?.0, p.object))));
     hits.extend(geometry.discs.iter().filter_map(|p| Some((p.shape.closest(ray)?, p.object))));
+    hits.extend(geometry.others.iter().filter_map(|p| Some((p.shape.closest(ray)?.0, p.object))));
     hits.extend(geometry.transformed.iter().filter_map(|p| {
         let local = ray.transformed(&p.shape.transform.to_object);
         let t = match &p.shape.shape {
             LocalShape::Sphere(sphere) => sphere.closest::<false>(&local)?,
             LocalShape::Cuboid(cuboid) => cuboid.closest(&local)?.0,
             LocalShape::Disc(disc) => disc.closest(&local)?,
+            LocalShape::Other(other) => other.closest(&local)?.0,
         };
         Some((t, p.object))
     }));
@@ -239,6 +241,27 @@ fn distant_rays_are_hit_as_without_a_tree() {
     check(&mut scene, &rays);
 }
 
+/// Their boxes are as flat as they are, and no flatter; rays pass along them.
+#[test]
+fn slightly_tilted_discs_and_cylinders_are_hit_as_without_a_tree() {
+    let (mut random, mut maker, mut rays) = (Random(17), Maker::default(), Vec::new());
+    for i in 0..40 {
+        let tilt = 2e-8 * random.unit();
+        let (center, normal) = (DVec3::new(0.0, f64::from(i % 2), 0.0), DVec3::new(-tilt, 1.0, 0.0));
+        let radius = 1.0 + random.unit();
+        if i % 4 < 2 {
+            maker.add(Shape::Disc { center: center.into(), normal: normal.into(), radius }, DAffine3::IDENTITY);
+        } else {
+            let to = center + normal * 0.25;
+            maker.add(Shape::Cylinder { from: center.into(), to: to.into(), radius, capped: true }, DAffine3::IDENTITY);
+        }
+        // Through the disc not far from its highest point, and just below the cylinder's first end.
+        let height = center.y + radius * tilt * (random.unit() * 2.0 - 1.0);
+        rays.extend([-5.0, 5.0].map(|x: f64| Ray::new(DVec3::new(x, height, 0.1), DVec3::X.copysign(DVec3::splat(-x)) * DVec3::X)));
+    }
+    check(&mut maker.compile(), &rays);
+}
+
 /// Every bit of every surface is the same with either vector width.
 #[test]
 fn vector_widths_give_the_same_bits() {
@@ -258,12 +281,17 @@ fn crossings_come_each_once() {
         sphere(DVec3::new(0.0, 3.0, 0.0), 1.0, 1),
         shape(Shape::Box { min: [-1.0, 5.0, -1.0], max: [1.0, 6.0, 1.0] }, 2),
         shape(Shape::Disc { center: [0.0, 8.0, 0.0], normal: [0.0, 1.0, 0.1], radius: 1.0 }, 0),
+        shape(Shape::Rectangle { corner: [-1.0, 9.0, -1.0], edge_u: [2.0, 0.0, 0.0], edge_v: [0.0, 0.5, 2.0] }, 1),
+        shape(Shape::Cylinder { from: [0.0, 10.0, 0.0], to: [0.0, 11.0, 0.1], radius: 1.0, capped: true }, 2),
+        shape(Shape::Cylinder { from: [0.0, 12.0, 0.0], to: [0.0, 13.0, 0.1], radius: 1.0, capped: false }, 0),
+        shape(Shape::Cone { from: [0.0, 14.0, 0.0], to: [0.0, 15.0, 0.0], radius: 1.0, to_radius: 0.0, capped: true }, 1),
+        shape(Shape::Cone { from: [0.0, 16.0, 0.0], to: [0.0, 17.0, 0.0], radius: 1.0, to_radius: 0.0, capped: false }, 2),
     ]);
     let mut seen = Vec::new();
-    assert!(!scene.any(&Ray::new(DVec3::new(0.1, 10.0, 0.1), -DVec3::Y), |material, crossing| {
+    assert!(!scene.any(&Ray::new(DVec3::new(0.1, 20.0, 0.1), -DVec3::Y), |material, crossing| {
         seen.push((crossing.t, material));
         false
     }));
     seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-    assert_eq!(seen.iter().map(|(_, material)| *material).collect::<Vec<_>>(), [0, 2, 2, 1, 1, 0]);
+    assert_eq!(seen.iter().map(|(_, material)| *material).collect::<Vec<_>>(), [2, 1, 1, 2, 2, 1, 0, 2, 2, 1, 1, 0]);
 }

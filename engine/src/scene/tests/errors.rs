@@ -43,6 +43,21 @@ fn impossible_shapes_name_the_object() {
         message_of(shape(Shape::Disc { center: [0.0; 3], normal: [0.0, 1.0, 0.0], radius: -1.0 }, 0)),
         "the disc's radius must be above 0, not -1"
     );
+    let rectangle = |edge_u, edge_v| message_of(shape(Shape::Rectangle { corner: [1.0; 3], edge_u, edge_v }, 0));
+    assert_eq!(rectangle([0.0; 3], [0.0, 1.0, 0.0]), "the rectangle's edge_u is 0");
+    assert_eq!(rectangle([1.0, 0.0, 0.0], [f64::NAN; 3]), "the rectangle's edge_v is not finite");
+    assert_eq!(rectangle([0.1, 0.2, 0.3], [0.1 * 3.0, 0.2 * 3.0, 0.3 * 3.0]), "the rectangle's edge_u and edge_v are parallel");
+    let cylinder = |to, radius| message_of(shape(Shape::Cylinder { from: [0.0, 1.0, 0.0], to, radius, capped: true }, 0));
+    assert_eq!(cylinder([0.0; 3], f64::NAN), "the cylinder's radius must be above 0, not NaN");
+    assert_eq!(cylinder([0.0, 1.0, 0.0], 1.0), "the cylinder's from and to are the same point");
+    assert_eq!(cylinder([0.0, f64::INFINITY, 0.0], 1.0), "the cylinder's to is not finite");
+    let long = Shape::Cylinder { from: [-1e308; 3], to: [1e308; 3], radius: 1.0, capped: true };
+    assert_eq!(message_of(shape(long, 0)), "the cylinder's length is not finite");
+    assert_eq!(cylinder([0.0, 1e80, 0.0], 1.0), "the object reaches farther than 1e75 from the middle of the world");
+    let cone = |radius, to_radius| message_of(shape(Shape::Cone { from: [0.0; 3], to: [1.0; 3], radius, to_radius, capped: true }, 0));
+    assert_eq!(cone(-1.0, 0.0), "the cone's radius and to_radius must be 0 or above, and not both 0: they are -1 and 0");
+    assert_eq!(cone(0.0, 0.0), "the cone's radius and to_radius must be 0 or above, and not both 0: they are 0 and 0");
+    assert_eq!(cone(1.0, f64::INFINITY), "the cone's radius and to_radius must be 0 or above, and not both 0: they are 1 and inf");
     assert_eq!(message_of(sphere(DVec3::ZERO, 1.0, 17)), "material 17 does not exist");
 }
 

@@ -2,9 +2,11 @@
 
 mod brute_force;
 mod builds;
+mod cones;
 mod errors;
 mod meshes;
 mod pencils;
+mod rectangles;
 mod spawn;
 mod transforms;
 
@@ -157,11 +159,24 @@ pub fn everything(seed: u64, count: usize) -> Maker {
     let ball = ball(12, 16, 0.1);
     for i in 0..count {
         let (center, radius) = (random.point() * 4.0, 0.1 + random.unit() * 0.5);
-        let kind = match i % 5 {
+        let kind = match i % 8 {
             0 => Shape::Sphere { center: center.into(), radius },
             1 => Shape::Box { min: center.into(), max: (center + DVec3::new(random.unit(), random.unit(), random.unit()) + 0.01).into() },
             2 => Shape::Disc { center: center.into(), normal: random.direction().into(), radius },
             3 if i == 3 => Shape::Plane { point: [0.0, -4.0, 0.0], normal: random.direction().into() },
+            4 => {
+                let edge = |random: &mut Random| (random.direction() * (0.1 + random.unit())).into();
+                Shape::Rectangle { corner: center.into(), edge_u: edge(&mut random), edge_v: edge(&mut random) }
+            }
+            5 => {
+                let to = center + random.direction() * (0.1 + random.unit());
+                Shape::Cylinder { from: center.into(), to: to.into(), radius, capped: i % 2 == 0 }
+            }
+            6 => {
+                let to = center + random.direction() * (0.1 + random.unit());
+                let to_radius = if random.bits().is_multiple_of(2) { 0.0 } else { random.unit() };
+                Shape::Cone { from: center.into(), to: to.into(), radius, to_radius, capped: random.bits().is_multiple_of(2) }
+            }
             _ => {
                 maker.mesh(&ball, placement(&mut random));
                 continue;

@@ -9,6 +9,10 @@ fn convex_shapes() -> Vec<(Shape, u32)> {
         (Shape::Box { min: [-0.5, -0.3, 0.1], max: [0.4, 0.6, 0.9] }, 1),
         (Shape::Disc { center: [0.3, -0.2, 0.5], normal: [0.3, 0.5, -0.4], radius: 0.7 }, 0),
         (Shape::Plane { point: [0.3, -0.2, 0.5], normal: [0.3, 0.5, -0.4] }, 0),
+        (Shape::Rectangle { corner: [-0.3, -0.5, 0.1], edge_u: [0.7, 0.5, 0.3], edge_v: [-0.4, 0.6, 0.2] }, 0),
+        (Shape::Cylinder { from: [-0.2, -0.5, 0.1], to: [0.4, 0.6, 0.7], radius: 0.4, capped: true }, 1),
+        (Shape::Cone { from: [-0.2, -0.5, 0.1], to: [0.4, 0.6, 0.7], radius: 0.6, to_radius: 0.0, capped: true }, 1),
+        (Shape::Cone { from: [-0.2, -0.5, 0.1], to: [0.4, 0.6, 0.7], radius: 0.2, to_radius: 0.5, capped: true }, 1),
     ]
 }
 

@@ -20,6 +20,11 @@ fn scale_object(object: &Object, mesh: crate::description::AssetId, scale: f64) 
             Shape::Box { min, max } => Shape::Box { min: by(min), max: by(max) },
             Shape::Disc { center, normal, radius } => Shape::Disc { center: by(center), normal, radius: radius * scale },
             Shape::Mesh { .. } => Shape::Mesh { data: mesh },
+            Shape::Rectangle { corner, edge_u, edge_v } => Shape::Rectangle { corner: by(corner), edge_u: by(edge_u), edge_v: by(edge_v) },
+            Shape::Cylinder { from, to, radius, capped } => Shape::Cylinder { from: by(from), to: by(to), radius: radius * scale, capped },
+            Shape::Cone { from, to, radius, to_radius, capped } => {
+                Shape::Cone { from: by(from), to: by(to), radius: radius * scale, to_radius: to_radius * scale, capped }
+            }
         };
     }
     object

@@ -31,7 +31,7 @@ fn scale(keys: &Keys) -> mlua::Result<Value> {
     let alike = x.value.is_number() || x.value.is_integer();
     let factors = if alike && keys.optional("y")?.is_none() { DVec3::splat(x.number(FINITE)?) } else { three(keys)? };
     if factors.min_element() == 0.0 || factors.x * factors.y * factors.z == 0.0 {
-        return Err(keys.fault("a factor of 0 makes things flat").with_help("for a flat thing use a disc or a mesh").into());
+        return Err(keys.fault("a factor of 0 makes things flat").with_help("for a flat thing use a rectangle, a disc or a mesh").into());
     }
     make(keys, DAffine3::from_scale(factors))
 }

@@ -106,6 +106,32 @@ end)()",
 }
 
 #[test]
+fn rectangles_cylinders_and_cones_are_described() {
+    let job = scene(
+        "tessera.rectangle { corner = {1, 2, 3}, edge_u = {2, 0, 0}, edge_v = {0, 4, 0}, material = grey },
+tessera.rectangle { edge_u = {2, 0, 0}, edge_v = {0, 4, 0}, material = grey },
+tessera.rectangle { center = {1, 2, 3}, edge_u = {2, 0, 0}, edge_v = {1, 4, 0}, material = grey },
+tessera.cylinder { material = grey },
+tessera.cylinder { from = {1, 2, 3}, to = {4, 5, 6}, radius = 0.5, capped = false, material = grey },
+tessera.cone { material = grey },
+tessera.cone { from = {1, 2, 3}, to = {4, 5, 6}, radius = 0, to_radius = 2, capped = false, material = grey }",
+    );
+    let scene = &job.description.frame.scene;
+    let objects = &scene.groups[scene.root as usize].objects;
+    let shapes: Vec<_> =
+        objects.iter().filter_map(|o| if let ObjectKind::Shape { shape, .. } = &o.kind { Some(shape) } else { None }).collect();
+    let rectangle = |corner, edge_u, edge_v| Shape::Rectangle { corner, edge_u, edge_v };
+    assert_eq!(*shapes[0], rectangle([1.0, 2.0, 3.0], [2.0, 0.0, 0.0], [0.0, 4.0, 0.0]));
+    assert_eq!(*shapes[1], rectangle([-1.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 4.0, 0.0]));
+    assert_eq!(*shapes[2], rectangle([-0.5, 0.0, 3.0], [2.0, 0.0, 0.0], [1.0, 4.0, 0.0]));
+    let (origin, up, from, to) = ([0.0; 3], [0.0, 1.0, 0.0], [1.0, 2.0, 3.0], [4.0, 5.0, 6.0]);
+    assert_eq!(*shapes[3], Shape::Cylinder { from: origin, to: up, radius: 1.0, capped: true });
+    assert_eq!(*shapes[4], Shape::Cylinder { from, to, radius: 0.5, capped: false });
+    assert_eq!(*shapes[5], Shape::Cone { from: origin, to: up, radius: 1.0, to_radius: 0.0, capped: true });
+    assert_eq!(*shapes[6], Shape::Cone { from, to, radius: 0.0, to_radius: 2.0, capped: false });
+}
+
+#[test]
 fn meshes_from_tables_and_from_buffers_are_the_same_asset() {
     let job = scene(
         "tessera.mesh { positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, triangles = {{1, 2, 3}}, uvs = {{0, 0}, {1, 0}, {0, 1}}, normals = {{0, 0, 2}, {0, 0, 1}, {0, 0, 1}}, material = grey },
