@@ -2,6 +2,8 @@
 
 use super::{
     frame::{self, FINEST, Normalisation, SMALLEST},
+    interleave::WALKERS,
+    mesh::Told,
     pack::PackRay,
 };
 use crate::shape::{
@@ -37,29 +39,37 @@ pub struct Block {
     pub filters: [PackRay; SIZE],
     ratio: [f64; SIZE],
     start: [f64; SIZE],
+    /// What each ray under way was told of, by its place among these.
+    pub told: [Told; WALKERS],
 }
 
 impl Block {
-    /// Prepares rays, at most `SIZE`, whose directions are of any length but 0.
+    /// Room for rays; to be used for many blocks, as making room takes as long as a ray.
     #[inline(always)]
-    pub fn new(frame: &Normalisation, rays: &[Ray]) -> Self {
+    pub fn new() -> Self {
         let none = [[0.0; 8]; SIZE / 8];
-        let mut block = Self {
-            count: rays.len().min(SIZE),
+        Self {
+            count: 0,
             origin: [none; 3],
             direction: [none; 3],
             inverse_near: [none; 3],
             inverse_far: [none; 3],
-            limit: [[-1.0; 8]; SIZE / 8],
+            limit: none,
             negative: [0; SIZE],
             filters: [PackRay::default(); SIZE],
             ratio: [0.0; SIZE],
             start: [0.0; SIZE],
-        };
-        for (group, rays) in rays.chunks(8).take(SIZE / 8).enumerate() {
-            block.prepare(frame, group, rays);
+            told: Default::default(),
         }
-        block
+    }
+
+    /// Prepares rays, at most `SIZE`, whose directions are of any length but 0.
+    #[inline(always)]
+    pub fn fill(&mut self, frame: &Normalisation, rays: &[Ray]) {
+        self.count = rays.len().min(SIZE);
+        for (group, rays) in rays.chunks(8).take(SIZE / 8).enumerate() {
+            self.prepare(frame, group, rays);
+        }
     }
 
     /// Prepares up to eight rays: the arithmetic of [`Normalisation::ray`] and [`crate::shape::triangle::Sheared::new`], each step for all of them, so that lanes can take it.
@@ -121,6 +131,7 @@ impl Block {
                 sums[k] += direction + origin * 0.0;
             }
         }
+        self.limit[group] = [-1.0; 8];
         for (k, ray) in rays.iter().take(8).enumerate() {
             let limit = frame::limit(ray.t_max, self.ratio[first + k], self.start[first + k]);
             self.limit[group][k] = if frame::is_sound(sizes[k], errors[k], sums[k]) { limit } else { -1.0 };
@@ -187,7 +198,9 @@ mod tests {
                 Ray { t_max: value(i + 3), ..Ray::new(DVec3::new(value(i + 1), value(i + 2), value(i + 17)), direction) }
             })
             .collect();
-        let block = Block::new(&frame, &rays);
+        let mut block = Block::new();
+        block.limit = [[1.0; 8]; SIZE / 8];
+        block.fill(&frame, &rays);
         for (i, ray) in rays.iter().enumerate() {
             let single = frame.ray::<false>(ray.origin, ray.direction);
             let sheared = Sheared::new(frame.point(ray.origin), ray.direction);

@@ -14,7 +14,7 @@ use super::{
 };
 
 /// Rays under way at a time.
-pub const WALKERS: usize = 8;
+pub const WALKERS: usize = 12;
 
 /// A ray under way.
 struct Walker<R> {
@@ -158,7 +158,7 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
         walker.current = self.root;
         walker.pending.clear();
         if ANY {
-            self.told[place].clear();
+            self.block.told[place].clear();
         }
     }
 }

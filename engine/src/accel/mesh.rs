@@ -191,7 +191,7 @@ impl MeshTree {
 
 /// The triangles that a ray has been told of.
 #[derive(Default)]
-pub(super) struct Told {
+pub(crate) struct Told {
     first: [u32; 8],
     count: usize,
     /// What the first places cannot hold: few rays go through so many surfaces and on.

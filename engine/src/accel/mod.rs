@@ -30,7 +30,7 @@ mod stream;
 mod traverse;
 mod tree;
 
-pub use block::SIZE as BLOCK;
+pub use block::{Block, SIZE as BLOCK};
 pub use collapse::LeafRule;
 pub use identity::Identity;
 pub use mesh::{MeshHit, MeshTree};

@@ -93,7 +93,7 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
         }
         let Some(packet) = Packet::of(self.block, group) else { return false };
         if ANY {
-            self.told.iter_mut().for_each(|told| told.clear());
+            self.block.told.iter_mut().for_each(|told| told.clear());
         }
         let mut pending = Pending::<R>::new();
         let mut limit = range(&self.block.limit[group]).1;

@@ -3,8 +3,7 @@
 use super::{
     block::{self, Block},
     frame::Normalisation,
-    interleave::WALKERS,
-    mesh::{MeshHit, MeshTree, Told},
+    mesh::{MeshHit, MeshTree},
     node::Node,
     pack::Pack,
     pending::{Left, Nearest, Unordered},
@@ -18,8 +17,6 @@ pub struct Stream<'m, V> {
     pub(super) packs: &'m [Pack],
     pub(super) root: u32,
     pub(super) block: &'m mut Block,
-    /// What each ray under way was told of.
-    pub(super) told: [Told; WALKERS],
     is_split: bool,
     frame: &'m Normalisation,
     rays: &'m mut [Ray],
@@ -29,27 +26,17 @@ pub struct Stream<'m, V> {
 impl MeshTree {
     /// Calls `visit` with the number of a ray and hits in `0 < t <= limit`, of either side, in no particular order; it returns the limit for what follows, or less
     /// than 0 for a ray that is done. A hit nearer than every limit is never left out. No triangle is hit twice by a ray if `ANY`. At most [`block::SIZE`] rays, in the
-    /// mesh's coordinates; their `t_max` is the first limit, and is changed.
+    /// mesh's coordinates; their `t_max` is the first limit, and is changed. The block is room that may be used again.
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub unsafe fn stream<L: Lanes, const ANY: bool>(&self, rays: &mut [Ray], visit: impl FnMut(usize, MeshHit) -> f64) {
+    pub unsafe fn stream<L: Lanes, const ANY: bool>(&self, block: &mut Block, rays: &mut [Ray], visit: impl FnMut(usize, MeshHit) -> f64) {
         let frame = self.tree.frame();
-        let mut block = Block::new(frame, rays);
+        block.fill(frame, rays);
         let count = block.len();
         let (nodes, root) = self.tree.parts();
-        let mut stream = Stream {
-            nodes,
-            packs: &self.packs,
-            root,
-            block: &mut block,
-            told: Default::default(),
-            is_split: self.is_split,
-            frame,
-            rays,
-            visit,
-        };
+        let mut stream = Stream { nodes, packs: &self.packs, root, block, is_split: self.is_split, frame, rays, visit };
         // SAFETY: the caller has the instructions of `L`.
         unsafe { if ANY { stream.lead::<L, Unordered, ANY>(count) } else { stream.lead::<L, Nearest<L::Keys>, ANY>(count) } }
     }
@@ -94,7 +81,7 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
                 let ray = self.rays.get_unchecked_mut(number);
                 let Some(at) = pack.hit_by(slot, self.frame.point(ray.origin), ray.direction) else { continue };
                 let at = TriangleHit { t: self.frame.unscaled(at.t), ..at };
-                if at.t > ray.t_max || (ANY && self.is_split && !self.told.get_unchecked_mut(place).is_new(pack.id(slot))) {
+                if at.t > ray.t_max || (ANY && self.is_split && !self.block.told.get_unchecked_mut(place).is_new(pack.id(slot))) {
                     continue;
                 }
                 ray.t_max = (self.visit)(number, MeshHit { triangle: pack.id(slot), at });
