@@ -62,14 +62,29 @@ pub enum Below {
     Pair(u32),
 }
 
-/// Builds a tree over at least one box; all are finite and in [-1, 1]. The root is node 0, children stand after their parents, and what is below the first
-/// of two comes right after them, before what is below the second. No way through it is longer than may be traversed. The same boxes give the same tree everywhere.
-pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
-    let nodes = in_order(&reinsert::improve(cluster::build(boxes)));
-    if depth(&nodes) <= MAX_DEPTH { nodes } else { median::build(boxes) }
+/// A tree that is not at its best yet: enough to tell which of two sets of boxes has the cheaper one.
+pub struct Draft(Vec<BinaryNode>);
+
+impl Draft {
+    /// Over at least one box; all are finite and in [-1, 1]. The same boxes give the same tree everywhere.
+    pub fn over(boxes: &[Box3]) -> Self {
+        Self(cluster::build(boxes))
+    }
+
+    /// What a random ray costs that looks at every box whose parent it meets, in proportion to the area of the root's.
+    pub fn cost(&self) -> f64 {
+        self.0.iter().map(|node| f64::from(node.bounds.half_area())).sum()
+    }
+
+    /// The tree at its best. The root is node 0, children stand after their parents, and what is below the first of two comes right after them, before what is
+    /// below the second. No way through it is longer than may be traversed. `boxes` are those that it was made of.
+    pub fn finish(self, boxes: &[Box3]) -> Vec<BinaryNode> {
+        let nodes = in_order(&reinsert::improve(self.0));
+        if depth(&nodes) <= MAX_DEPTH { nodes } else { median::build(boxes) }
+    }
 }
 
-/// The same tree with its nodes in the order that [`build`] promises.
+/// The same tree with its nodes in the order that [`Draft::finish`] promises.
 fn in_order(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
     let mut ordered = Vec::with_capacity(nodes.len());
     ordered.push(nodes[0]);
@@ -149,7 +164,7 @@ mod tests {
                 let clustered = cluster::build(&boxes);
                 check(&clustered, &boxes);
                 check(&reinsert::improve(clustered), &boxes);
-                for nodes in [build(&boxes), median::build(&boxes)] {
+                for nodes in [Draft::over(&boxes).finish(&boxes), median::build(&boxes)] {
                     check(&nodes, &boxes);
                     assert_eq!(in_order(&nodes), nodes);
                 }

@@ -43,12 +43,11 @@ struct Costs {
 pub struct Collapse {
     binary: Vec<BinaryNode>,
     plans: Vec<Plan>,
-    cost: f32,
 }
 
 impl Collapse {
     /// Finds the wide tree of least surface area cost (Wald et al., "Getting Rid of Packets", 2008; Ylitie et al., "Efficient Incoherent Ray Traversal on
-    /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::build`].
+    /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::Draft::finish`].
     pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule) -> Self {
         let mut plans = vec![Plan { split: [0; 7], wide: 0 }; binary.len()];
         // Costs are asked for once, by the parent. From the last pair to the first, those of the children of both of a pair are the last that were found.
@@ -65,13 +64,8 @@ impl Collapse {
             let second_costs = of(first + 1, &mut known);
             known.extend([second_costs, first_costs]);
         }
-        let cost = of(0, &mut known).of[0];
-        Self { binary, plans, cost }
-    }
-
-    /// What a random ray costs, in visits of a node times the area of a box.
-    pub fn cost(&self) -> f32 {
-        self.cost
+        of(0, &mut known);
+        Self { binary, plans }
     }
 
     /// Makes the wide tree. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).

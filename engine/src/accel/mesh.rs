@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::{DVec3, Vec3};
 
 use super::{
-    build::Box3,
+    build::{Box3, Draft},
     collapse::{Collapse, LeafRule},
     frame::Normalisation,
     identity::Identity,
@@ -50,10 +50,14 @@ struct Cheapest {
 
 impl Cheapest {
     fn of(whole: &[Box3], vertices: impl Fn(u32) -> [Vec3; 3], leaves: LeafRule) -> Self {
-        let parts = split(whole, vertices).map(|References { boxes, triangles }| Self { tree: Tree::plan(&boxes, leaves), triangles });
-        let plain = Self { tree: Tree::plan(whole, leaves), triangles: Vec::new() };
-        let Some(parts) = parts else { return plain };
-        if parts.tree.cost() < plain.tree.cost() { parts } else { plain }
+        let plain = Draft::over(whole);
+        if let Some(References { boxes, triangles }) = split(whole, vertices) {
+            let parts = Draft::over(&boxes);
+            if parts.cost() < plain.cost() {
+                return Self { tree: Collapse::plan(parts.finish(&boxes), leaves), triangles };
+            }
+        }
+        Self { tree: Collapse::plan(plain.finish(whole), leaves), triangles: Vec::new() }
     }
 }
 

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 use glam::DVec3;
 
 use super::{
-    build::{self, Box3},
+    build::{Box3, Draft},
     collapse::{Collapse, Collapsed, LeafRule},
     frame::{BoxRay, Normalisation},
     identity::Identity,
@@ -31,12 +31,7 @@ impl Tree {
         let frame = Normalisation::of(boxes.iter().fold(Bounds::EMPTY, |sum, b| sum.union(*b)));
         let normalised: Vec<Box3> =
             boxes.iter().map(|b| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() }).collect();
-        Self::carry_out(frame, Self::plan(&normalised, rule), leaf)
-    }
-
-    /// The best tree over boxes in normalised coordinates.
-    pub fn plan(boxes: &[Box3], rule: LeafRule) -> Collapse {
-        Collapse::plan(build::build(boxes), rule)
+        Self::carry_out(frame, Collapse::plan(Draft::over(&normalised).finish(&normalised), rule), leaf)
     }
 
     /// Makes a planned tree. `leaf` as for [`Self::build`].
