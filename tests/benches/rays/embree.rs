@@ -6,7 +6,7 @@ use std::{
 };
 
 use libloading::Library;
-use tessera_engine::shape::Ray;
+use tessera_engine::{description::Matrix, shape::Ray};
 
 use super::scenes::Model;
 
@@ -17,6 +17,8 @@ const INDICES: c_int = 0;
 const VERTICES: c_int = 1;
 const UINT3: c_int = 0x5003;
 const FLOAT3: c_int = 0x9003;
+const INSTANCE: c_int = 121;
+const ROWS: c_int = 0x9134;
 const QUALITY_HIGH: c_int = 2;
 const ROBUST: c_int = 4;
 const COHERENT: c_int = 1 << 16;
@@ -119,19 +121,57 @@ impl Embree {
             let indices = buffer(geometry, INDICES, 0, UINT3, 12, model.triangles.len());
             model.triangles.as_ptr().copy_to_nonoverlapping(indices.cast(), model.triangles.len());
             self.function::<unsafe extern "C" fn(Handle)>("rtcCommitGeometry")(geometry);
-            let scene = self.function::<unsafe extern "C" fn(Handle) -> Handle>("rtcNewScene")(self.device);
-            let set: unsafe extern "C" fn(Handle, c_int) = self.function("rtcSetSceneFlags");
-            set(scene, if robust { ROBUST } else { 0 });
-            let set: unsafe extern "C" fn(Handle, c_int) = self.function("rtcSetSceneBuildQuality");
-            set(scene, QUALITY_HIGH);
-            self.function::<unsafe extern "C" fn(Handle, Handle) -> c_uint>("rtcAttachGeometry")(scene, geometry);
-            self.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(scene);
+            let mesh = self.committed(robust, &[geometry]);
+            let scene = if model.places.is_empty() { mesh } else { self.committed(robust, &self.instances(mesh, &model.places)) };
             Tree {
                 scene,
                 intersect: self.function("rtcIntersect1"),
                 occluded: self.function("rtcOccluded1"),
                 intersect8: self.function("rtcIntersect8"),
             }
+        }
+    }
+}
+
+impl Embree {
+    /// A scene of what was committed.
+    ///
+    /// # Safety
+    /// The geometries are Embree's.
+    unsafe fn committed(&self, robust: bool, geometries: &[Handle]) -> Handle {
+        // SAFETY: the signatures are those of Embree 4.
+        unsafe {
+            let scene = self.function::<unsafe extern "C" fn(Handle) -> Handle>("rtcNewScene")(self.device);
+            let set: unsafe extern "C" fn(Handle, c_int) = self.function("rtcSetSceneFlags");
+            set(scene, if robust { ROBUST } else { 0 });
+            let set: unsafe extern "C" fn(Handle, c_int) = self.function("rtcSetSceneBuildQuality");
+            set(scene, QUALITY_HIGH);
+            let attach = self.function::<unsafe extern "C" fn(Handle, Handle) -> c_uint>("rtcAttachGeometry");
+            geometries.iter().for_each(|geometry| _ = attach(scene, *geometry));
+            self.function::<unsafe extern "C" fn(Handle)>("rtcCommitScene")(scene);
+            scene
+        }
+    }
+
+    /// A scene at many places.
+    ///
+    /// # Safety
+    /// The scene is Embree's.
+    unsafe fn instances(&self, scene: Handle, places: &[Matrix]) -> Vec<Handle> {
+        // SAFETY: the signatures are those of Embree 4, and a place is twelve numbers by rows.
+        unsafe {
+            let new = self.function::<unsafe extern "C" fn(Handle, c_int) -> Handle>("rtcNewGeometry");
+            let show = self.function::<unsafe extern "C" fn(Handle, Handle)>("rtcSetGeometryInstancedScene");
+            let put = self.function::<unsafe extern "C" fn(Handle, c_uint, c_int, *const f32)>("rtcSetGeometryTransform");
+            let commit = self.function::<unsafe extern "C" fn(Handle)>("rtcCommitGeometry");
+            let instance = |place: &Matrix| {
+                let (instance, rows) = (new(self.device, INSTANCE), place.map(|row| row.map(|x| x as f32)));
+                show(instance, scene);
+                put(instance, 0, ROWS, rows.as_flattened().as_ptr());
+                commit(instance);
+                instance
+            };
+            places.iter().map(instance).collect()
         }
     }
 }

@@ -1,10 +1,10 @@
-//! What rays are traced through: a scan-like mesh, architecture, hair, and a real scan where `TESSERA_MODELS` names a folder that has it.
+//! What rays are traced through: a scan-like mesh, architecture, hair, a field of instances, and a real scan where `TESSERA_MODELS` names a folder that has it.
 
 use std::{f64::consts::TAU, fs, path::Path};
 
-use glam::{DVec2, DVec3};
+use glam::{DMat3, DQuat, DVec2, DVec3};
 use tessera_engine::{
-    description::{Frame, Group, MemoryAssets, Model as File, ModelFormat, Object, ObjectKind, SourceId},
+    description::{Frame, Group, Matrix, MemoryAssets, Model as File, ModelFormat, Object, ObjectKind, SourceId},
     scene::Scene,
 };
 use tessera_tests::s1;
@@ -21,24 +21,28 @@ pub struct Model {
     /// Tangent of half the angle of view.
     pub half_view: f64,
     pub lamp: DVec3,
+    /// Where the triangles are shown; once, where they are, if nowhere.
+    pub places: Vec<Matrix>,
 }
 
 /// All scenes, made one after the other.
 pub fn all() -> impl Iterator<Item = Model> {
-    let makers: [fn() -> Option<Model>; 4] = [|| Some(knot()), || Some(hall()), || Some(needles()), bunny];
+    let makers: [fn() -> Option<Model>; 5] = [|| Some(knot()), || Some(hall()), || Some(needles()), || Some(field()), bunny];
     makers.into_iter().filter_map(|make| make())
 }
 
 impl Model {
     fn new(name: &'static str, eye: [f64; 3], look_at: [f64; 3], half_view: f64, lamp: [f64; 3]) -> Self {
         let (positions, triangles) = (Vec::new(), Vec::new());
-        Self { name, positions, triangles, eye: eye.into(), look_at: look_at.into(), half_view, lamp: lamp.into() }
+        Self { name, positions, triangles, eye: eye.into(), look_at: look_at.into(), half_view, lamp: lamp.into(), places: Vec::new() }
     }
 
     /// The diagonal of its box.
     pub fn size(&self) -> f64 {
         let points = self.positions.iter().map(|p| DVec3::from(p.map(f64::from)));
-        let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        let places = self.places.iter().map(|[x, y, z]| DVec3::new(x[3], y[3], z[3]));
+        let points: Vec<DVec3> = if self.places.is_empty() { points.collect() } else { places.collect() };
+        let (low, high) = points.into_iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
         (high - low).length()
     }
 
@@ -47,9 +51,14 @@ impl Model {
         let mut assets = MemoryAssets::default();
         let file = assets.insert(self.ply());
         let model = File { format: ModelFormat::Ply, file, parts: Vec::new() };
-        let object = Object { kind: ObjectKind::Model { model, material: None }, transform: None, source: SourceId::default() };
+        let object = |transform: Option<Matrix>| {
+            let kind = ObjectKind::Model { model: model.clone(), material: None };
+            Object { kind, transform, source: SourceId::default() }
+        };
+        let places = self.places.iter().map(|place| object(Some(*place)));
+        let objects = if self.places.is_empty() { vec![object(None)] } else { places.collect() };
         let mut frame: Frame = s1::frame(64, 64);
-        frame.scene.groups = vec![Group { objects: vec![object] }];
+        frame.scene.groups = vec![Group { objects }];
         frame.scene.root = 0;
         Scene::compile(&frame, &assets).expect("the model compiles")
     }
@@ -198,6 +207,27 @@ fn needles() -> Model {
         let side = (tip - root).cross(on_sphere(numbers.unit(), numbers.unit())).normalize() * 0.002;
         let triangle = [root - side, root + side, tip].map(|point| model.vertex(point));
         model.triangles.push(triangle);
+    }
+    model
+}
+
+/// Ten thousand rough balls of all sizes, turned and stretched, strewn over a plain.
+fn field() -> Model {
+    let mut model = Model::new("field", [0.0, -52.0, 9.0], [0.0, -20.0, 0.0], 0.6, [20.0, -30.0, 40.0]);
+    model.patch(40, 20, |u, v| {
+        let ((sa, ca), (sb, cb)) = ((u * TAU).sin_cos(), (v * TAU * 0.5).sin_cos());
+        let out = DVec3::new(ca * sb, sa * sb, cb);
+        out * (1.0 + 0.15 * rough(out * 2.0))
+    });
+    let mut numbers = Numbers(5);
+    for _ in 0..10_000 {
+        let size = numbers.between(0.15, 0.7);
+        let turn = DQuat::from_axis_angle(on_sphere(numbers.unit(), numbers.unit()), numbers.between(0.0, TAU));
+        let stretch = DVec3::new(numbers.between(0.5, 1.5), numbers.between(0.5, 1.5), numbers.between(0.5, 1.5)) * size;
+        let map = DMat3::from_quat(turn) * DMat3::from_diagonal(stretch);
+        let place = DVec3::new(numbers.between(-50.0, 50.0), numbers.between(-50.0, 50.0), numbers.between(0.0, 1.5));
+        let rows = map.transpose().to_cols_array_2d();
+        model.places.push(std::array::from_fn(|i| [rows[i][0], rows[i][1], rows[i][2], place[i]]));
     }
     model
 }
