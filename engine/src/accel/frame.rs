@@ -1,7 +1,8 @@
 //! Coordinates in which a tree's boxes fit f32 well, and rays in them.
 
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec3, Vec3A};
 
+use super::build::Box3;
 use crate::{math::max_abs, shape::Bounds};
 
 /// Centre and power-of-two scale that take everything in a tree into [-1, 1]. So f32 boxes are tight wherever the tree lies in the world, and
@@ -85,6 +86,12 @@ impl Normalisation {
     #[inline(always)]
     pub fn unscaled<T: std::ops::Mul<f64, Output = T>>(&self, length: T) -> T {
         length * self.unscale
+    }
+
+    /// The box that is this one in normalised coordinates.
+    pub fn unscaled_box(&self, bounds: Box3) -> Bounds {
+        let corner = |p: Vec3| self.unscaled(p.as_dvec3()) + self.center;
+        Bounds { min: corner(bounds.min), max: corner(bounds.max) }
     }
 
     /// The factor that [`Self::point`] and [`Self::length`] apply.

@@ -108,6 +108,11 @@ impl MeshTree {
         self.bounds
     }
 
+    /// See [`Tree::outline`].
+    pub fn outline(&self, visit: impl FnMut(Bounds)) {
+        self.tree.outline(visit);
+    }
+
     /// Indices of a triangle's vertices.
     pub fn indices(&self, triangle: u32) -> [usize; 3] {
         self.triangles[triangle as usize].map(|i| i as usize)

@@ -1,6 +1,8 @@
 //! Nodes of eight children.
 
-use super::{identity::Identity, simd::Lanes};
+use glam::Vec3;
+
+use super::{build::Box3, identity::Identity, simd::Lanes};
 
 /// Bytes of one bound of all children of a node.
 pub const BOUND: usize = size_of::<[f32; 8]>();
@@ -31,6 +33,14 @@ impl Node {
         ],
         children: [LEAF; 8],
     };
+
+    /// References of its children, with their boxes.
+    pub fn boxes(&self) -> impl Iterator<Item = (u32, Box3)> {
+        let corner =
+            |first: usize, place: usize| Vec3::new(self.bounds[first][place], self.bounds[first + 1][place], self.bounds[first + 2][place]);
+        let child = move |place: usize| (self.children[place], Box3 { min: corner(0, place), max: corner(3, place) });
+        (0..8).map(child).filter(|(_, bounds)| bounds.min.cmple(bounds.max).all())
+    }
 
     /// Adds all that it is.
     pub fn identify(&self, identity: &mut Identity) {

@@ -57,6 +57,17 @@ impl Tree {
         (self.root & LEAF != 0).then_some(self.root & !LEAF)
     }
 
+    /// Calls `visit` with boxes that together hold everything: those two nodes down, at most 64; with none where there is nothing but one leaf.
+    pub fn outline(&self, mut visit: impl FnMut(Bounds)) {
+        let Some(root) = self.nodes.get(self.root as usize) else { return };
+        for (reference, bounds) in root.boxes() {
+            match self.nodes.get(reference as usize) {
+                Some(node) => node.boxes().for_each(|(_, bounds)| visit(self.frame.unscaled_box(bounds))),
+                None => visit(self.frame.unscaled_box(bounds)),
+            }
+        }
+    }
+
     /// Prepares a ray for [`Tree::visit`].
     #[inline(always)]
     pub fn ray<const UNIT_LENGTH: bool>(&self, origin: DVec3, direction: DVec3) -> BoxRay {

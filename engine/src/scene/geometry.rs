@@ -124,7 +124,7 @@ impl Geometry {
         add(kind::DISC, &mut self.discs.iter().map(|s| s.shape.bounds()));
         add(kind::OTHER, &mut self.others.iter().map(|s| s.shape.bounds()));
         add(kind::TRANSFORMED, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
-        add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds(self.meshes[s.shape.mesh as usize].tree.bounds())));
+        add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds_of(&self.meshes[s.shape.mesh as usize].tree)));
         let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
         self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
         self.tree = (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
@@ -162,6 +162,21 @@ impl Transform {
     /// The box around the image of a box.
     pub fn bounds(&self, bounds: Bounds) -> Bounds {
         Bounds::of(bounds.corners().map(|corner| self.to_world.transform_point3(corner)))
+    }
+
+    /// A box around the image of a mesh: that of its box, as far as images of the boxes in it reach, which are smaller by far where it is turned (Arvo, "Transforming
+    /// Axis-Aligned Bounding Boxes", Graphics Gems, 1990).
+    pub fn bounds_of(&self, mesh: &MeshTree) -> Bounds {
+        let whole = self.bounds(mesh.bounds());
+        let DAffine3 { matrix3, translation } = self.to_world;
+        let sizes = DMat3::from_cols(matrix3.x_axis.abs(), matrix3.y_axis.abs(), matrix3.z_axis.abs());
+        let mut outline = Bounds::EMPTY;
+        mesh.outline(|Bounds { min, max }| {
+            let (middle, reach) = (matrix3 * ((min + max) * 0.5) + translation, sizes * ((max - min) * 0.5));
+            outline = outline.union(Bounds { min: middle - reach, max: middle + reach });
+        });
+        let is_empty = outline == Bounds::EMPTY;
+        if is_empty { whole } else { Bounds { min: whole.min.max(outline.min), max: whole.max.min(outline.max) } }
     }
 
     /// A bound on the coordinates of the image of a box.

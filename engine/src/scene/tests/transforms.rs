@@ -129,3 +129,17 @@ fn texture_coordinates_follow_their_conventions() {
     assert_eq!(uv(DVec3::X).to_array(), [0.75, 0.5]);
     assert_eq!(uv(DVec3::Y).y, 0.0);
 }
+
+/// The box of an instance holds every vertex, and hardly more, however it is turned and stretched.
+#[test]
+fn instances_have_close_boxes() {
+    let (mesh, mut random) = (ball(40, 60, 0.2), Random(5));
+    for _ in 0..100 {
+        let map = placement(&mut random);
+        let (low, high) = Maker::default().mesh(&mesh, map).compile().bounds().unwrap();
+        let vertices = mesh.positions.iter().map(|p| map.transform_point3(glam::Vec3::from(*p).as_dvec3()));
+        let (least, greatest) = vertices.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+        assert!((low - 1e-12).cmple(least).all() && (high + 1e-12).cmpge(greatest).all(), "{map}");
+        assert!((high - low).cmple((greatest - least) * 1.4).all(), "{} {} {map}", high - low, greatest - least);
+    }
+}
