@@ -27,11 +27,15 @@ pub struct Tree {
 impl Tree {
     /// Builds a tree over at least one box; all are finite. `leaf` is given the boxes of every leaf and returns what visits of it will be
     /// given (31 bits).
-    pub fn build(boxes: &[Bounds], rule: LeafRule, leaf: impl FnMut(&[u32]) -> u32) -> Self {
+    pub fn build(boxes: Vec<Bounds>, rule: LeafRule, leaf: impl FnMut(&[u32]) -> u32) -> Self {
         let frame = Normalisation::of(boxes.iter().fold(Bounds::EMPTY, |sum, b| sum.union(*b)));
-        let normalised: Vec<Box3> =
-            boxes.iter().map(|b| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() }).collect();
-        Self::carry_out(frame, Collapse::plan(Draft::over(&normalised).finish(&normalised), rule), leaf)
+        // Each is dropped as soon as it can be: a million instances weigh enough.
+        let normalised = |b: Bounds| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() };
+        let normalised: Vec<Box3> = boxes.iter().copied().map(normalised).collect();
+        drop(boxes);
+        let binary = Draft::over(&normalised).finish(&normalised);
+        drop(normalised);
+        Self::carry_out(frame, Collapse::plan(binary, rule), leaf)
     }
 
     /// Makes a planned tree. `leaf` as for [`Self::build`].
@@ -115,7 +119,7 @@ mod tests {
     #[test]
     fn empty_places_are_never_visited() {
         let boxes = [-1.0, 0.0, 3.0].map(|x| Bounds::of([DVec3::splat(x), DVec3::splat(x + 0.5)]));
-        let tree = Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |things| 100 + things[0]);
+        let tree = Tree::build(boxes.to_vec(), LeafRule { most: 1, cost: 1.0 }, |things| 100 + things[0]);
         for size in [1.0, 1e20, 1e38, 1e50, 1e53, 1e56, 1e90, 1e200, 1e307, f64::INFINITY, f64::NAN] {
             for axes in [DVec3::X, DVec3::new(0.3, -0.5, 0.9), DVec3::NEG_ONE] {
                 for length in [1.0, 1e-30, 1e30, 1e200] {

@@ -23,10 +23,10 @@ pub struct Placed<S> {
 pub struct Transform {
     pub to_world: DAffine3,
     pub to_object: DAffine3,
-    is_identity: bool,
     /// Largest factor by which a vector's largest component grows on the way to the world, and back.
     growth_to_world: f64,
     growth_to_object: f64,
+    is_identity: bool,
 }
 
 /// A finite shape under a map that does not leave it the same kind of shape.
@@ -104,6 +104,7 @@ impl Geometry {
     /// Builds the tree over all finite shapes, or all but a few spheres, and prepares those for rays from the eye and towards lights. `is_clear`
     /// tells materials that cast no shadow.
     pub fn finish(&mut self, eye: DVec3, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
+        self.instances.shrink_to_fit();
         self.spheres.sort_by_key(|sphere| is_clear(sphere.material));
         let mut boxes = Vec::new();
         let mut references = Vec::new();
@@ -127,7 +128,7 @@ impl Geometry {
         add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds_of(&self.meshes[s.shape.mesh as usize].tree)));
         let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
         self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
-        self.tree = (!boxes.is_empty()).then(|| Tree::build(&boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
+        self.tree = (!boxes.is_empty()).then(|| Tree::build(boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
     }
 }
 

@@ -28,7 +28,7 @@ pub struct Statistics {
     pub triangles: usize,
     /// Triangles of all appearances.
     pub instanced_triangles: usize,
-    /// Memory of meshes and trees in bytes.
+    /// Memory of meshes, their instances and trees in bytes.
     pub bytes: usize,
     /// Nodes on the longest way through the tree of any mesh.
     pub depth: usize,
@@ -57,6 +57,7 @@ impl Statistics {
             triangles: geometry.meshes.iter().map(|mesh| mesh.tree.count()).sum(),
             instanced_triangles: geometry.instances.iter().map(|placed| triangles(placed.shape.mesh)).sum(),
             bytes: geometry.meshes.iter().map(|mesh| mesh.bytes()).sum::<usize>()
+                + size_of_val(&*geometry.instances)
                 + geometry.tree.as_ref().map_or(0, |tree| tree.bytes())
                 + geometry.list.as_ref().map_or(0, |list| list.bytes()),
             depth: geometry.meshes.iter().map(|mesh| mesh.tree.depth()).max().unwrap_or(0),
