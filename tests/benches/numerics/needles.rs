@@ -33,6 +33,11 @@ fn needles(random: &mut Random) -> MeshData {
     })
 }
 
+/// The vertices of a triangle, as they are stored.
+fn bits_of(mesh: &MeshData, triangle: usize) -> [[u32; 3]; 3] {
+    mesh.triangles[triangle].map(|i| mesh.positions[i as usize].map(f32::to_bits))
+}
+
 fn is_sound(surface: &Surface) -> bool {
     let vectors = [surface.point, surface.ng, surface.ns];
     vectors.iter().all(|v| v.is_finite()) && surface.t > 0.0 && surface.t.is_finite() && surface.error >= 0.0 && surface.error.is_finite()
@@ -59,7 +64,10 @@ pub fn finite(rays: u64) -> Tally {
         for (ray, answer) in rays.iter().zip(ask(scene, &rays)) {
             let surface = scene.closest(ray);
             let sound = surface.as_ref().is_none_or(is_sound) && answer.agrees() && surface.is_some() == answer.hits[0].is_some();
-            tally.check(sound, || format!("{surface:?}: {}", answer.told(ray)));
+            tally.check(sound, || {
+                let met = answer.hits[0].map(|hit| bits_of(mesh, hit.part as usize));
+                format!("triangle {met:x?} with {surface:?}: {}", answer.told(ray))
+            });
         }
     })
 }
@@ -93,9 +101,7 @@ pub fn specks(rays: u64) -> Tally {
         };
         let rays: Vec<Ray> = (0..count).map(|_| by(random)).collect();
         for (ray, answer) in rays.iter().zip(ask(&scene, &rays)) {
-            tally.check(answer.is_missed(), || {
-                format!("size {size:e} {:x?}: {}", mesh.positions.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>(), bits(ray))
-            });
+            tally.check(answer.is_missed(), || format!("size {size:e}, triangle {:x?}: {}", bits_of(&mesh, 0), bits(ray)));
         }
     })
 }
