@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-pub use libm::{acos, asin, atan, atan2, cos, exp, exp2, log as ln, log2, pow, powf, sin, sincos as sin_cos, tan};
+pub use libm::{acos, asin, atan, atan2, cos, exp, exp2, fma, log as ln, log2, pow, powf, sin, sincos as sin_cos, tan};
 
 /// The unit roundoff of f64, 2^-53: the largest relative error of one operation.
 pub const UNIT: f64 = f64::EPSILON / 2.0;

@@ -1,10 +1,13 @@
 //! Triangles: the watertight test of Woop, Benthin, Wald ("Watertight Ray/Triangle Intersection", JCGT 2(1), 2013), in f64.
 //!
 //! The ray is sheared onto the z axis; every vertex is projected by the same arithmetic for all of its triangles, and the edge functions
-//! of the projected vertices round monotonically, so that their signs are right or zero. Zero counts as inside: no ray slips between
-//! triangles that share an edge or a vertex.
+//! of the projected vertices round monotonically, so that their signs are right or zero. Those that come out as zero are computed anew
+//! without rounding, so that all signs are right: where rounding made them zero, triangles far too small to be told apart from a point would be met by
+//! rays that pass far beside it. True zeros count as inside: no ray slips between triangles that share an edge or a vertex.
 
 use glam::DVec3;
+
+use crate::math::fma;
 
 /// A ray made ready for triangles. Its axes are turned so that the direction's largest component comes last.
 #[derive(Clone, Copy, Debug)]
@@ -84,12 +87,17 @@ impl Sheared {
     pub fn hit(&self, [a, b, c]: [[f64; 3]; 3]) -> Option<TriangleHit> {
         let (near_a, near_b, near_c) = (less(a, self.origin), less(b, self.origin), less(c, self.origin));
         let ((ax, ay), (bx, by), (cx, cy)) = (self.project(near_a), self.project(near_b), self.project(near_c));
-        let u = cx * by - cy * bx;
-        let v = ax * cy - ay * cx;
-        let w = bx * ay - by * ax;
-        // Without branches, of which nobody could foretell the way.
-        if ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0)) {
+        let mut u = cx * by - cy * bx;
+        let mut v = ax * cy - ay * cx;
+        let mut w = bx * ay - by * ax;
+        if is_outside(u, v, w) {
             return None;
+        }
+        if (u == 0.0) | (v == 0.0) | (w == 0.0) {
+            (u, v, w) = (exact(u, (cx, cy), (bx, by)), exact(v, (ax, ay), (cx, cy)), exact(w, (bx, by), (ax, ay)));
+            if is_outside(u, v, w) {
+                return None;
+            }
         }
         let sum = u + v + w;
         if sum == 0.0 {
@@ -110,6 +118,20 @@ impl Sheared {
     fn project(&self, [x, y, z]: [f64; 3]) -> (f64, f64) {
         (x - self.shear[0] * z, y - self.shear[1] * z)
     }
+}
+
+/// Whether edge functions have both signs: without branches, of which nobody could foretell the way.
+#[inline(always)]
+fn is_outside(u: f64, v: f64, w: f64) -> bool {
+    ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0))
+}
+
+/// An edge function, or, where that came out as 0, what rounding took from its products, which were equal then.
+#[cold]
+#[inline(never)]
+fn exact(rounded: f64, (px, py): (f64, f64), (qx, qy): (f64, f64)) -> f64 {
+    let rest = |a: f64, b: f64| fma(a, b, -(a * b));
+    if rounded == 0.0 { rest(px, qy) - rest(py, qx) } else { rounded }
 }
 
 /// The smaller one, or `b` where they cannot be compared: one instruction.

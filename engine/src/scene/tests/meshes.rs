@@ -69,6 +69,23 @@ fn degenerate_and_duplicate_triangles_change_nothing() {
     }
 }
 
+/// Triangles of a few units in the last place of their distance: products of coordinates beside the ray, once rounded, do not tell their vertices apart.
+#[test]
+fn triangles_far_below_resolution_are_passed_by() {
+    let (mut random, eye) = (Random(12), DVec3::new(0.0, 3.5, 11.0));
+    for _ in 0..2_000 {
+        let size = crate::math::pow(10.0, -15.5 + 2.0 * random.unit());
+        let mut corner = || (random.point() * size).as_vec3().to_array();
+        let mesh = MeshData { positions: vec![corner(), corner(), corner()], triangles: vec![[0, 1, 2]], ..Default::default() };
+        let scene = mesh_scene(&mesh);
+        for _ in 0..100 {
+            let beside = eye.cross(random.direction()).normalize() * (1.0 + random.unit() * 2.0);
+            let ray = Ray::new(eye, (beside - eye).normalize());
+            assert_eq!(scene.closest(&ray), None, "size {size:e}, {:?}", mesh.positions);
+        }
+    }
+}
+
 #[test]
 fn coincident_objects_are_won_by_the_earlier() {
     let mut random = Random(2);
