@@ -4,6 +4,7 @@ mod compile;
 mod error;
 mod geometry;
 mod identity;
+mod outlined;
 mod place;
 mod query;
 mod statistics;

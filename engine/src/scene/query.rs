@@ -7,13 +7,14 @@ use glam::DVec2;
 use super::{
     Scene,
     geometry::{Instance, LocalShape, Placed, kind},
+    outlined::Outlined,
     surface::{Crossing, Surface},
     tracer::{Tracer, Work},
 };
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
-    accel::{Baseline, Lanes, MeshHit, Pencil, Simd},
+    accel::{Lanes, MeshHit, Pencil, Simd},
     shape::{Point, Ray, Sphere, triangle::TriangleHit},
 };
 
@@ -61,53 +62,6 @@ impl Hit {
         if hit.t < self.t || (hit.t == self.t && (hit.object, hit.part) < (self.object, self.part)) {
             *self = hit;
         }
-    }
-}
-
-/// Queries of one mesh as functions of their own, so that scenes without meshes do not pay for them in registers.
-pub(super) trait Outlined: Lanes {
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool;
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Outlined for Avx2 {
-    #[inline(always)]
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-        #[target_feature(enable = "avx2,bmi1")]
-        #[inline(never)]
-        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-            // SAFETY: this function enables the instructions.
-            unsafe { scene.closest_of_mesh_in::<Avx2>(ray, reference, best) }
-        }
-        // SAFETY: the caller has the instructions.
-        unsafe { outlined(scene, ray, reference, best) }
-    }
-
-    #[inline(always)]
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-        #[target_feature(enable = "avx2,bmi1")]
-        #[inline(never)]
-        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-            // SAFETY: this function enables the instructions.
-            unsafe { scene.any_of_mesh_in::<Avx2>(ray, reference, blocked) }
-        }
-        // SAFETY: the caller has the instructions.
-        unsafe { outlined(scene, ray, reference, blocked) }
-    }
-}
-
-impl Outlined for Baseline {
-    #[inline(never)]
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-        // SAFETY: every machine has these instructions.
-        unsafe { scene.closest_of_mesh_in::<Baseline>(ray, reference, best) }
-    }
-
-    #[inline(never)]
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-        // SAFETY: every machine has these instructions.
-        unsafe { scene.any_of_mesh_in::<Baseline>(ray, reference, blocked) }
     }
 }
 
@@ -387,7 +341,7 @@ impl Scene {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn closest_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, best: &mut Hit) {
+    pub(super) unsafe fn closest_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, best: &mut Hit) {
         let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
         let local = Ray { t_max: best.t, ..placed.shape.transform.of_ray(ray) };
         let visit = |hit: MeshHit| {
@@ -403,7 +357,7 @@ impl Scene {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn any_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+    pub(super) unsafe fn any_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
         let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
         let local = placed.shape.transform.of_ray(ray);
         let visit = |hit: MeshHit| {
