@@ -3,11 +3,12 @@
 //! The ray is sheared onto the z axis; every vertex is projected by the same arithmetic for all of its triangles, and the edge functions
 //! of the projected vertices round monotonically, so that their signs are right or zero. Those that come out as zero are computed anew
 //! without rounding, so that all signs are right: where rounding made them zero, triangles far too small to be told apart from a point would be met by
-//! rays that pass far beside it. True zeros count as inside: no ray slips between triangles that share an edge or a vertex.
+//! rays that pass far beside it. Where the ray meets an edge or a vertex truly, it is moved aside by less than any number (Edelsbrunner, Mücke, "Simulation of
+//! Simplicity", 1990): of the triangles that meet there, it goes through as many as beside it, so that no ray slips between them and none is counted twice.
 
 use glam::DVec3;
 
-use crate::math::fma;
+use crate::math::{fma, orthonormal_basis};
 
 /// A ray made ready for triangles. Its axes are turned so that the direction's largest component comes last.
 #[derive(Clone, Copy, Debug)]
@@ -95,7 +96,7 @@ impl Sheared {
         }
         if (u == 0.0) | (v == 0.0) | (w == 0.0) {
             (u, v, w) = (exact(u, (cx, cy), (bx, by)), exact(v, (ax, ay), (cx, cy)), exact(w, (bx, by), (ax, ay)));
-            if is_outside(u, v, w) {
+            if is_outside(side(u, (cx, cy), (bx, by)), side(v, (ax, ay), (cx, cy)), side(w, (bx, by), (ax, ay))) {
                 return None;
             }
         }
@@ -134,6 +135,18 @@ fn exact(rounded: f64, (px, py): (f64, f64), (qx, qy): (f64, f64)) -> f64 {
     if rounded == 0.0 { rest(px, qy) - rest(py, qx) } else { rounded }
 }
 
+/// On which side of an edge the ray passes once it is moved by (e, e^2), e > 0 and smaller than any number.
+#[inline(always)]
+fn side(exact: f64, (px, py): (f64, f64), (qx, qy): (f64, f64)) -> f64 {
+    if exact != 0.0 {
+        exact
+    } else if py != qy {
+        py - qy
+    } else {
+        qx - px
+    }
+}
+
 /// The smaller one, or `b` where they cannot be compared: one instruction.
 #[inline(always)]
 fn least(a: f64, b: f64) -> f64 {
@@ -167,8 +180,15 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// Normal on the counter-clockwise side, of twice the area's length.
+/// Normal on the counter-clockwise side, of twice the area's length; of a triangle without area, some vector perpendicular to its edges: rounding lets rays meet it.
 #[inline(always)]
 pub fn geometric_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a)
+    let normal = (b - a).cross(c - a);
+    if normal == DVec3::ZERO { beside([b - a, c - a]) } else { normal }
+}
+
+#[cold]
+fn beside(edges: [DVec3; 2]) -> DVec3 {
+    let edge = edges.into_iter().find(|edge| *edge != DVec3::ZERO);
+    edge.map_or(DVec3::Z, |edge| orthonormal_basis(edge.normalize()).0)
 }

@@ -192,3 +192,21 @@ fn backs_and_masked_surfaces_are_passed_through() {
     scene.materials[0].base_alpha = 0.5;
     assert_eq!(scene.closest(&from_outside).unwrap().t, near);
 }
+
+/// Corners in one line, which rounding lets rays meet: they get a normal nevertheless.
+#[test]
+fn triangles_without_area_have_normals() {
+    let corners = [[0.75, 0.5, 0.0], [1.25, 1.0, 0.5], [1.0, 0.75, 0.25]];
+    let mesh = MeshData { positions: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Default::default() };
+    let (scene, mut random, mut hits) = (mesh_scene(&mesh), Random(2), 0);
+    let [from, to, _] = corners.map(|p| glam::Vec3::from(p).as_dvec3());
+    for _ in 0..100_000 {
+        let origin = random.point() * 3.0;
+        let ray = Ray::new(origin, (from.lerp(to, random.unit()) - origin).normalize());
+        if let Some(surface) = scene.closest(&ray) {
+            hits += 1;
+            assert!(surface.ng.is_normalized() && surface.ns.is_normalized(), "{surface:?}");
+        }
+    }
+    assert!(hits > 100, "{hits}");
+}
