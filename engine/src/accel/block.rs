@@ -14,6 +14,12 @@ use crate::shape::{
 /// Most rays in a block: so many that few walk alone at its end, and so few that they stay close to the processor.
 pub const SIZE: usize = 64;
 
+/// Rays of a block are numbered in bytes.
+const _: () = assert!(SIZE <= 256 && SIZE.is_multiple_of(8));
+
+/// Unlike the bits of any three axes: such a ray goes the way of no other.
+const UNSOUND: u8 = 8;
+
 /// A value for each of eight rays.
 pub type Eight = [f32; 8];
 
@@ -33,7 +39,7 @@ pub struct Block {
     pub inverse_far: [Each; 3],
     /// Where boxes stop to matter; below 0 for a ray that is done.
     pub limit: Each,
-    /// A bit for each axis along which the direction is negative.
+    /// A bit for each axis along which the direction is negative; `UNSOUND` for a ray that is none.
     pub negative: [u8; SIZE],
     /// For packs of triangles.
     pub filters: [PackRay; SIZE],
@@ -134,12 +140,13 @@ impl Block {
         self.limit[group] = [-1.0; 8];
         for (k, ray) in rays.iter().take(8).enumerate() {
             let limit = frame::limit(ray.t_max, self.ratio[first + k], self.start[first + k]);
-            self.limit[group][k] = if frame::is_sound(sizes[k], errors[k], sums[k]) { limit } else { -1.0 };
+            let is_sound = frame::is_sound(sizes[k], errors[k], sums[k]);
+            self.limit[group][k] = if is_sound { limit } else { -1.0 };
             let [x, y, z] = AXES[axes[k]];
             let origin = [self.origin[x][group][k], self.origin[y][group][k], self.origin[z][group][k]];
             let magnitude = frame::magnitude(sizes[k], errors[k], FINEST);
             self.filters[first + k] = PackRay::of([x, y, z], origin, shear[k], magnitude, negative[k] >> z & 1 == 1);
-            self.negative[first + k] = negative[k];
+            self.negative[first + k] = if is_sound { negative[k] } else { UNSOUND };
         }
     }
 

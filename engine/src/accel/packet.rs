@@ -3,8 +3,9 @@
 
 use super::{
     block::{Block, Each, Eight},
+    interleave::WALKERS,
     mesh::MeshHit,
-    node::{LEAF, far_bound, near_bounds},
+    node::{LEAF, Node, far_bound, near_bounds},
     pending::{Left, Pending},
     simd::Lanes,
     stream::Stream,
@@ -12,6 +13,9 @@ use super::{
 
 /// Most that directions may differ, in a component, in proportion to the largest; and origins, in halves of the tree's size: rays farther apart have little in common.
 const WIDEST: f32 = 1.0 / 24.0;
+
+/// Each ray of a packet has a place among those under way.
+const _: () = assert!(WALKERS >= 8);
 
 /// Eight rays of a block.
 struct Packet {
@@ -24,7 +28,7 @@ struct Packet {
 }
 
 impl Packet {
-    /// `None` where the rays' directions have different signs, or go far apart.
+    /// `None` where the rays' directions have different signs, or go far apart, or boxes cannot tell what one of them meets.
     #[inline(always)]
     fn of(block: &Block, group: usize) -> Option<Self> {
         let negative = block.negative[group * 8];
@@ -37,12 +41,18 @@ impl Packet {
             let far_first = |(low, high): (f32, f32)| if is_negative { (low, high) } else { (high, low) };
             let (low, high) = range(&block.origin[axis][group]);
             let (least, greatest) = range(&block.direction[axis][group]);
-            if high - low > WIDEST || greatest - least > WIDEST {
+            // What is no number is not narrow either.
+            let is_narrow = high - low <= WIDEST && greatest - least <= WIDEST;
+            if !is_narrow {
                 return None;
             }
             (packet.near_ray[0][axis], packet.far_ray[0][axis]) = far_first((low, high));
             packet.near_ray[1][axis] = far_first(range(&block.inverse_near[axis][group])).1;
             packet.far_ray[1][axis] = far_first(range(&block.inverse_far[axis][group])).0;
+            // A ray that enters and leaves all boxes at once has nothing in common with one that does not.
+            if packet.near_ray[1][axis] == 0.0 {
+                return None;
+            }
         }
         Some(packet)
     }
@@ -52,7 +62,7 @@ impl Packet {
     /// # Safety
     /// The child is one of the tree's. The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn meets<L: Lanes>(&self, block: &Block, node: &super::node::Node, place: usize) -> u32 {
+    unsafe fn meets<L: Lanes>(&self, block: &Block, node: &Node, place: usize) -> u32 {
         // SAFETY: by this function's own condition.
         unsafe {
             let of = |each: &Each| -> *const Eight { each.as_ptr().add(self.group) };

@@ -30,8 +30,9 @@ pub struct Unordered(u32);
 impl<L: Lanes> Left<L> for Nearest<L::Keys> {
     #[inline(always)]
     unsafe fn of(enter: L, leave: L) -> Self {
+        // Adding 0 takes its sign from -0, which would order last.
         // SAFETY: by the trait's condition, as below.
-        unsafe { Self(enter.keys(leave)) }
+        unsafe { Self(enter.add(L::splat(0.0)).keys(leave)) }
     }
 
     #[inline(always)]

@@ -40,7 +40,7 @@ pub(crate) trait Lanes: Copy {
     unsafe fn le(self, o: Self) -> u32;
     /// Eight distances, each cut to the upper half of its bits: they order as the distances do, but for some that are nearly the same.
     type Keys: Copy;
-    /// Of all `self[i]` that are not above `o[i]`; all bits are set for the others.
+    /// Of all `self[i]` that are not above `o[i]`, none of which has a sign; all bits are set for the others.
     unsafe fn keys(self, o: Self) -> Self::Keys;
     /// The least key and its place, below 8.
     unsafe fn least(keys: Self::Keys) -> (u32, usize);

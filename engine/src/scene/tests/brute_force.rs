@@ -225,6 +225,29 @@ fn streams_find_what_single_rays_find() {
     assert!(hits > rays.len() / 4, "{hits}");
 }
 
+/// A mesh by itself, from so near and so far away that boxes can tell something or nothing, eight rays at a time from about one place, and each from elsewhere; one of
+/// every eight from nowhere.
+#[test]
+fn distant_and_broken_rays_in_streams_find_what_they_find_alone() {
+    let mut scene = Maker::default().mesh(&ball(30, 40, 0.2), DAffine3::IDENTITY).compile();
+    let mut random = Random(31);
+    for exponent in (0..48).map(|step| 1.0 + f64::from(step) * 0.5) {
+        let distance = crate::math::exp2(exponent);
+        let mut rays = Vec::new();
+        for group in 0..64 {
+            let from = random.direction();
+            for lane in 0..8 {
+                let from = if group % 2 == 0 { from * (1.0 + 0.2 * random.signed()) } else { random.direction() };
+                let (target, origin) = (random.point() * 0.05, from * distance);
+                let broken = group % 4 == 2 && lane == group / 4 % 8;
+                let direction = (target - origin).normalize();
+                rays.push(Ray::new(if broken { DVec3::new(f64::NAN, origin.y, origin.z) } else { origin }, direction));
+            }
+        }
+        check_streams(&mut scene, &rays);
+    }
+}
+
 /// From a thousand to 10^12 scene sizes away.
 #[test]
 fn distant_rays_are_hit_as_without_a_tree() {
