@@ -89,8 +89,8 @@ fn compare(embree: &Embree, model: &Model, ratios: &mut Vec<f64>) {
         let mut contenders = vec![
             Contender::new("embree", |rays, out| fast.trace(rays, any, out)),
             Contender::new("robust", |rays, out| robust.trace(rays, any, out)),
-            Contender::new("single", |rays, out| trace(&scene, rays, any, out)),
-            Contender::new("stream", |rays, out| stream(&scene, rays, any, out)),
+            Contender::new("single", |rays, out| trace(&scene, rays, any, false, out)),
+            Contender::new("stream", |rays, out| trace(&scene, rays, any, true, out)),
         ];
         if set.is_coherent {
             contenders.push(Contender::new("packets", |rays, out| fast.trace_packets(rays, out)));
@@ -133,42 +133,25 @@ fn is_same(a: f64, b: f64) -> bool {
     a == b || (a - b).abs() <= SAME * b.abs()
 }
 
-/// Our distances; of rays that only ask whether anything is there, 0 or infinity.
-fn trace(scene: &Scene, rays: &[Ray], any: bool, out: &mut Vec<f64>) {
-    struct Rays<'r>(&'r [Ray], bool, &'r mut Vec<f64>);
+/// Our distances, of one ray after the other or asked for all at once; of rays that only ask whether anything is there, 0 or infinity.
+fn trace(scene: &Scene, rays: &[Ray], any: bool, at_once: bool, out: &mut Vec<f64>) {
+    struct Rays<'r>(&'r [Ray], bool, bool, &'r mut Vec<f64>);
     impl Work for Rays<'_> {
         type Output = ();
 
         #[inline(always)]
         fn run(self, scene: impl Tracer) {
-            let Self(rays, any, out) = self;
-            if any {
-                out.extend(rays.iter().map(|ray| if scene.any(ray, |_, _| true) { 0.0 } else { f64::INFINITY }));
-            } else {
-                out.extend(rays.iter().map(|ray| scene.hit(ray).map_or(f64::INFINITY, |hit| hit.t)));
+            let Self(rays, any, at_once, out) = self;
+            let blocked = |is_blocked: bool| if is_blocked { 0.0 } else { f64::INFINITY };
+            match (any, at_once) {
+                (true, true) => scene.any_of(rays, |_, _, _| true, |_, is_blocked| out.push(blocked(is_blocked))),
+                (true, false) => out.extend(rays.iter().map(|ray| blocked(scene.any(ray, |_, _| true)))),
+                (false, true) => scene.hits(rays, |_, hit| out.push(hit.map_or(f64::INFINITY, |hit| hit.t))),
+                (false, false) => out.extend(rays.iter().map(|ray| scene.hit(ray).map_or(f64::INFINITY, |hit| hit.t))),
             }
         }
     }
-    scene.run(Rays(rays, any, out));
-}
-
-/// The same, asked for all at once.
-fn stream(scene: &Scene, rays: &[Ray], any: bool, out: &mut Vec<f64>) {
-    struct Rays<'r>(&'r [Ray], bool, &'r mut Vec<f64>);
-    impl Work for Rays<'_> {
-        type Output = ();
-
-        #[inline(always)]
-        fn run(self, scene: impl Tracer) {
-            let Self(rays, any, out) = self;
-            if any {
-                scene.any_of(rays, |_, _, _| true, |_, is_blocked| out.push(if is_blocked { 0.0 } else { f64::INFINITY }));
-            } else {
-                scene.hits(rays, |_, hit| out.push(hit.map_or(f64::INFINITY, |hit| hit.t)));
-            }
-        }
-    }
-    scene.run(Rays(rays, any, out));
+    scene.run(Rays(rays, any, at_once, out));
 }
 
 /// A unit vector, evenly over all directions, from two numbers in [0, 1).
