@@ -6,13 +6,18 @@ use super::{
     node::{LEAF, Node},
 };
 
-/// What leaves are, and what they cost compared with testing one node.
+/// What leaves of triangles are, and what they cost compared with testing one node.
 #[derive(Clone, Copy, Debug)]
 pub struct LeafRule {
     /// Most boxes in a leaf, at most 8.
     pub most: u32,
     /// Cost of visiting a leaf, of any size.
     pub cost: f32,
+}
+
+impl LeafRule {
+    /// A pack of triangles costs less than a node, measured.
+    pub const MEASURED: Self = Self { most: 8, cost: 0.7 };
 }
 
 /// Nodes and root reference.
@@ -32,6 +37,13 @@ struct Plan {
     wide: u8,
 }
 
+impl Plan {
+    const LEAF: Self = Self { split: [0; 7], wide: 0 };
+}
+
+/// More boxes than a leaf may have.
+const TOO_MANY: u32 = 9;
+
 /// What a subtree costs at the least with one, two, ... seven places, and how many boxes it has.
 #[derive(Clone, Copy)]
 struct Costs {
@@ -47,15 +59,20 @@ pub struct Collapse {
 
 impl Collapse {
     /// Finds the wide tree of least surface area cost (Wald et al., "Getting Rid of Packets", 2008; Ylitie et al., "Efficient Incoherent Ray Traversal on
-    /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::Draft::finish`].
-    pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule) -> Self {
-        let mut plans = vec![Plan { split: [0; 7], wide: 0 }; binary.len()];
+    /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::Draft::finish`]. Boxes from `others` on are alone in their
+    /// leaves, which cost as much as a node.
+    pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule, others: u32) -> Self {
+        let mut plans = vec![Plan::LEAF; binary.len()];
         // Costs are asked for once, by the parent. From the last pair to the first, those of the children of both of a pair are the last that were found.
         let mut known: Vec<Costs> = Vec::new();
         let mut of = |at: usize, known: &mut Vec<Costs>| {
             let children = matches!(binary[at].below, Below::Pair(_)).then(|| [known.pop(), known.pop()]);
             let children = if let Some([Some(first), Some(second)]) = children { Some([first, second]) } else { None };
-            let (plan, costs) = weigh(binary[at].bounds.half_area(), children, rule);
+            let area = binary[at].bounds.half_area();
+            let (plan, costs) = match binary[at].below {
+                Below::Leaf(other) if other >= others => (Plan::LEAF, Costs { of: [area; 7], count: TOO_MANY }),
+                _ => weigh(area, children, rule),
+            };
             plans[at] = plan;
             costs
         };
@@ -123,14 +140,14 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
 
 /// The best plan for a node of this area: a leaf, or what its children are.
 fn weigh(area: f32, children: Option<[Costs; 2]>, rule: LeafRule) -> (Plan, Costs) {
-    let mut plan = Plan { split: [0; 7], wide: 0 };
+    let mut plan = Plan::LEAF;
     let Some([first, second]) = children else { return (plan, Costs { of: [area * rule.cost; 7], count: 1 }) };
     let best_split = |places: usize| {
         let splits = places.saturating_sub(7).max(1)..places.min(8);
         let costs = splits.map(|k| (first.of[k - 1] + second.of[places - k - 1], k as u8));
         costs.fold((f32::INFINITY, 1), |best, next| if next.0 < best.0 { next } else { best })
     };
-    let count = first.count + second.count;
+    let count = (first.count + second.count).min(TOO_MANY);
     let (below, wide) = best_split(8);
     let as_leaf = if count <= rule.most { area * rule.cost } else { f32::INFINITY };
     if as_leaf > area + below {

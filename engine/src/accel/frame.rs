@@ -1,6 +1,6 @@
 //! Coordinates in which a tree's boxes fit f32 well, and rays in them.
 
-use glam::{DVec3, Vec3, Vec3A};
+use glam::{DVec3, Vec3};
 
 use super::build::Box3;
 use crate::{math::max_abs, shape::Bounds};
@@ -15,8 +15,8 @@ pub struct Normalisation {
     unscale: f64,
 }
 
-/// Bound on the relative error, in f64, of moving a ray's start.
-const START_ERROR: f64 = 1.0 / (1u64 << 48) as f64;
+/// Bound on the relative error, in f64, of moving a ray's start, and of its coordinates in an instance that stands in a tree of the world.
+const START_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
 /// Smallest unit of error that filters allow for.
 pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
@@ -25,7 +25,7 @@ pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
 /// box, of its growing, and what a ray that started anew is wrong by, of u each.
 pub const OUTWARD: f32 = 1.0 / (1 << 21) as f32;
 
-/// From here on a ray starts anew.
+/// From here on a ray starts anew: no component of its place can come to within 1 of the centre sooner.
 const FAR: f64 = 4.0;
 
 /// Most that a ray which started anew may be wrong by for its boxes to be believed.
@@ -36,12 +36,15 @@ const NEARLY: f32 = 1.0 / (1 << 24) as f32;
 /// Rounding is covered twice: boxes are larger by `OUTWARD` than what they hold, and reciprocals are shrunk for near bounds and grown for far bounds by 2^-21,
 /// which covers the four roundings of a product. A ray from far away starts anew before the tree, so that its rounding is that of a near one. Parameters are
 /// `ratio` times those of the original ray, less `start`.
-#[derive(Clone, Copy, Debug)]
+///
+/// Vectors have a fourth component, so that the processor's lanes can take them.
+#[derive(Clone, Copy, Debug, Default)]
+#[repr(C, align(32))]
 pub struct BoxRay {
-    pub(super) origin: Vec3A,
-    pub(super) direction: Vec3A,
-    pub(super) inverse_near: Vec3A,
-    pub(super) inverse_far: Vec3A,
+    pub(super) origin: [f32; 4],
+    pub(super) inverse_near: [f32; 4],
+    pub(super) inverse_far: [f32; 4],
+    pub(super) direction: [f32; 4],
     /// Bit i is set where the direction is negative: the near bound is the upper one.
     pub(super) negative: u32,
     /// |origin|.
@@ -70,6 +73,11 @@ impl Normalisation {
         Self::new(DVec3::ZERO, max_abs(bounds.max).max(max_abs(bounds.min)))
     }
 
+    /// Whether the origin stays where it is.
+    pub fn keeps_origin(&self) -> bool {
+        self.center == DVec3::ZERO
+    }
+
     /// A point in normalised coordinates.
     #[inline(always)]
     pub fn point(&self, p: DVec3) -> DVec3 {
@@ -94,35 +102,31 @@ impl Normalisation {
         Bounds { min: corner(bounds.min), max: corner(bounds.max) }
     }
 
-    /// The factor that [`Self::point`] and [`Self::length`] apply.
-    #[inline(always)]
-    pub fn scale(&self) -> f64 {
-        self.scale
-    }
-
     /// A ray in normalised coordinates. `direction` has any length but 0.
     #[inline(always)]
     pub fn ray<const UNIT_LENGTH: bool>(&self, origin: DVec3, direction: DVec3) -> BoxRay {
         let (size, unit) = if UNIT_LENGTH { (1.0, 1.0) } else { powers_of_two(max_abs(direction)) };
-        let (p, d) = (self.point(origin), direction * unit);
-        let distance = max_abs(p);
-        let (p, start) = if distance > FAR {
-            let start = new_start(distance, max_abs(d));
-            (p + d * start, start)
-        } else {
-            (p, 0.0)
-        };
-        let (origin, direction) = (p.as_vec3a(), d.as_vec3a());
-        let error = error_of(start);
-        let inverse = (Vec3A::ONE / direction.abs().max(Vec3A::splat(SMALLEST))).copysign(direction);
+        let mut p = four(self.point(origin));
+        let d = four(direction * unit);
+        let distance = largest(p.map(f64::abs));
+        let mut start = 0.0;
+        if distance > FAR {
+            start = (distance - 2.0) / largest(d.map(f64::abs));
+            p = std::array::from_fn(|i| p[i] + d[i] * start);
+        }
+        let (origin, direction) = (p.map(|x| x as f32), d.map(|x| x as f32));
+        let error = (start * START_ERROR) as f32;
+        let raised = direction.map(|x| if x.abs() > SMALLEST { x.abs() } else { SMALLEST });
+        let inverse: [f32; 4] = std::array::from_fn(|i| (1.0 / raised[i]).copysign(direction[i]));
         let (shrunk, grown) = slack(error);
+        let [x, y, z, _] = direction.map(|x| x.to_bits() >> 31);
         BoxRay {
             origin,
+            inverse_near: inverse.map(|x| x * shrunk),
+            inverse_far: inverse.map(|x| x * grown),
             direction,
-            inverse_near: inverse * shrunk,
-            inverse_far: inverse * grown,
-            negative: direction.is_negative_bitmask(),
-            size: origin.abs().max_element(),
+            negative: x | y << 1 | z << 2,
+            size: largest(origin.map(f32::abs)),
             error,
             ratio: self.scale * size,
             start,
@@ -130,67 +134,58 @@ impl Normalisation {
     }
 }
 
+/// With a fourth component that is 0.
+#[inline(always)]
+fn four(v: DVec3) -> [f64; 4] {
+    [v.x, v.y, v.z, 0.0]
+}
+
+/// The largest component, or any if one is no number.
+#[inline(always)]
+fn largest<T: PartialOrd + Copy>([x, y, z, _]: [T; 4]) -> T {
+    let greater = |a: T, b: T| if a > b { a } else { b };
+    greater(greater(x, y), z)
+}
+
 /// Components of a direction below this are raised to it: over the distances that matter the change stays far below `OUTWARD`.
-pub const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
-
-/// Where a ray starts anew whose origin's largest component is `distance`, and its direction's `largest`: no component can come to within 1 of the
-/// centre sooner than this. 0 for a ray that need not.
-#[inline(always)]
-pub fn new_start(distance: f64, largest: f64) -> f64 {
-    if distance > FAR { (distance - 2.0) / largest } else { 0.0 }
-}
-
-/// Bound on what a ray is wrong by that started anew.
-#[inline(always)]
-pub fn error_of(start: f64) -> f32 {
-    (start * START_ERROR) as f32
-}
+const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// Factors for reciprocals at near and at far bounds.
 #[inline(always)]
-pub fn slack(error: f32) -> (f32, f32) {
+fn slack(error: f32) -> (f32, f32) {
     const SLACK: f32 = 1.0 / (1 << 21) as f32;
     // From so far away that boxes cannot tell what it meets, it enters and leaves all of them at once.
     if error > NEARLY { (0.0, 0.0) } else { (1.0 - SLACK, 1.0 + SLACK) }
 }
 
-/// See [`BoxRay::magnitude`].
-#[inline(always)]
-pub fn magnitude(size: f32, error: f32, unit: f32) -> f32 {
-    1.0 + size + error * (1.0 / unit)
-}
-
-/// See [`BoxRay::is_sound`]; `direction` is the sum of its components.
-#[inline(always)]
-pub fn is_sound(size: f32, error: f32, direction: f32) -> bool {
-    (magnitude(size, error, FINEST) + direction).is_finite() & ((size <= 1.125 * FAR as f32) | (error > NEARLY))
-}
-
-/// See [`BoxRay::limit`].
-#[inline(always)]
-pub fn limit(t: f64, ratio: f64, start: f64) -> f32 {
-    (t * ratio - start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + error_of(start)
-}
-
 impl BoxRay {
+    /// Origin and near inverse, far inverse and direction.
+    #[inline(always)]
+    pub(super) fn halves(&self) -> &[[f32; 8]; 2] {
+        // SAFETY: in this order they stand at the beginning, one after the other.
+        unsafe { &*(&raw const *self).cast() }
+    }
+
     /// Whether it may meet anything. A ray from where numbers end has none, and every comparison would let it into boxes that are not there. One that started
     /// anew has come to within `FAR` of the centre, if it is to meet anything: where its largest component gets into the tree, so do the
     /// others, not more than 3 later.
     #[inline(always)]
     pub fn is_sound(&self) -> bool {
-        is_sound(self.size, self.error, self.direction.element_sum())
+        let [x, y, z, _] = self.direction;
+        (self.magnitude(FINEST) + x + y + z + self.origin.iter().sum::<f32>() * 0.0).is_finite()
+            & ((self.size <= 1.125 * FAR as f32) | (self.error > NEARLY))
     }
 
     /// 1 + |origin|, and as much as covers the ray's own error for a filter that allows for errors of this times `unit`.
     #[inline(always)]
     pub fn magnitude(&self, unit: f32) -> f32 {
-        magnitude(self.size, self.error, unit)
+        1.0 + self.size + self.error * (1.0 / unit)
     }
 
     /// A parameter of the original ray as a limit for boxes, rounded up.
     #[inline(always)]
     pub fn limit(&self, t: f64) -> f32 {
-        limit(t, self.ratio, self.start)
+        (t * self.ratio - self.start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + self.error
     }
 }
 

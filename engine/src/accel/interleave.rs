@@ -3,14 +3,13 @@
 use std::mem::MaybeUninit;
 
 use super::{
-    block::Block,
-    mesh::MeshHit,
     node::{LEAF, Node, near_bounds},
     pack::Pack,
     pages::prefetch,
     pending::{Left, Pending},
     simd::Lanes,
     stream::Stream,
+    visitor::Visitor,
 };
 
 /// Rays under way at a time.
@@ -57,8 +56,8 @@ impl Turn {
     }
 }
 
-impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
-    /// Leads rays of the block, given by their numbers, through the mesh.
+impl<V: Visitor> Stream<'_, V> {
+    /// Leads rays of the block, given by their numbers, through the tree.
     ///
     /// # Safety
     /// The processor has the instructions of `L`. The numbers are below the block's count.
@@ -105,17 +104,14 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
     /// The walker is at a node of the tree. The processor has the instructions of `L`.
     #[inline(always)]
     unsafe fn step<L: Lanes, R: Left<L>>(&self, walker: &mut Walker<R>) -> bool {
-        let (block, ray) = (&*self.block, walker.ray);
+        let block = &*self.block;
         // SAFETY: by this function's own condition; the ray is one of the block.
         unsafe {
             let node = self.nodes.get_unchecked(walker.current as usize);
-            let [x, y, z] = &block.origin;
-            let origin = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
-            let [x, y, z] = &block.inverse_near;
-            let inverse_near = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
-            let [x, y, z] = &block.inverse_far;
-            let inverse_far = [L::splat(Block::of(x, ray)), L::splat(Block::of(y, ray)), L::splat(Block::of(z, ray))];
-            let limit = L::splat(Block::of(&block.limit, ray));
+            let ray = block.rays.get_unchecked(walker.ray);
+            let [origin, inverse_near, inverse_far] =
+                [ray.origin, ray.inverse_near, ray.inverse_far].map(|[x, y, z, _]| [L::splat(x), L::splat(y), L::splat(z)]);
+            let limit = L::splat(block.limit_of(walker.ray));
             let (enter, leave) = node.meet(walker.near, [origin, inverse_near], [origin, inverse_far], limit);
             let met = R::of(enter, leave);
             let (_, next) = met.next();
@@ -140,7 +136,7 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
     ) -> bool {
         // SAFETY: by this function's own condition; the ray is one of the block, and pending are children of this tree's nodes.
         unsafe {
-            match walker.pending.pop::<L>(Block::of(&self.block.limit, walker.ray)) {
+            match walker.pending.pop::<L>(self.block.limit_of(walker.ray)) {
                 Some(child) => walker.current = child.reference(self.nodes),
                 None if *begun < numbers.len() => self.begin::<R, ANY>(walker, place, numbers, begun),
                 None => return false,
@@ -154,7 +150,7 @@ impl<V: FnMut(usize, MeshHit) -> f64> Stream<'_, V> {
     fn begin<R: Copy, const ANY: bool>(&mut self, walker: &mut Walker<R>, place: usize, numbers: &[u8], begun: &mut usize) {
         walker.ray = numbers[*begun].into();
         *begun += 1;
-        walker.near = near_bounds(self.block.negative[walker.ray].into());
+        walker.near = near_bounds(self.block.rays[walker.ray].negative);
         walker.current = self.root;
         walker.pending.clear();
         if ANY {

@@ -9,7 +9,7 @@ use super::{
 };
 use crate::{
     math::max_abs,
-    shape::triangle::{Sheared, TriangleHit},
+    shape::triangle::{AXES, Sheared, TriangleHit},
 };
 
 /// A ray as the filter sees it.
@@ -26,6 +26,16 @@ pub struct PackRay {
     forward: f32,
 }
 
+/// The axis along which a direction of these magnitudes goes most: without branches, of which nobody could foretell the way.
+#[inline(always)]
+fn last_axis([x, y, z, _]: [f32; 4]) -> usize {
+    let y_first = usize::from(y > x);
+    if z > if y > x { y } else { x } { 2 } else { y_first }
+}
+
+/// u, half a unit in the last place of 1.
+const UNIT: f32 = 1.0 / (1 << 24) as f32;
+
 /// Bytes of one coordinate of eight points.
 const AXIS: usize = size_of::<[f32; 8]>();
 
@@ -40,24 +50,20 @@ unsafe fn along<L: Lanes>(points: &[[f32; 8]; 3], axis: u32) -> L {
 }
 
 impl PackRay {
-    /// The same ray twice.
+    /// The same ray. Its own axes are turned so that the direction's largest component comes last.
     #[inline(always)]
-    pub fn new(ray: &BoxRay, sheared: &Sheared) -> Self {
-        let ([x, y, z], origin) = (sheared.axes(), ray.origin.to_array());
-        let shear = sheared.shear().map(|s| s as f32);
-        Self::of([x, y, z], [origin[x], origin[y], origin[z]], shear, ray.magnitude(FINEST), sheared.is_backward())
-    }
-
-    /// From its axes; origin and shear in these; the ray's magnitude, see [`BoxRay::magnitude`]; and whether it goes backward along the last axis.
-    #[inline(always)]
-    pub fn of(axes: [usize; 3], origin: [f32; 3], shear: [f32; 2], magnitude: f32, is_backward: bool) -> Self {
+    pub fn new(ray: &BoxRay) -> Self {
+        let (direction, origin) = (ray.direction, ray.origin);
+        let [x, y, z] = AXES[last_axis(direction.map(f32::abs))];
+        let scale = 1.0 / direction[z];
+        let magnitude = ray.magnitude(FINEST);
         Self {
-            axes: axes.map(|axis| (axis * AXIS) as u32),
-            origin,
-            shear,
+            axes: [x, y, z].map(|axis| (axis * AXIS) as u32),
+            origin: [origin[x], origin[y], origin[z]],
+            shear: [direction[x] * scale, direction[y] * scale],
             near: magnitude * (1.0 / (1 << 22) as f32),
             slack: magnitude * (1.0 / (1 << 17) as f32),
-            forward: if is_backward { -1.0 } else { 1.0 },
+            forward: direction[z],
         }
     }
 
@@ -78,8 +84,8 @@ impl PackRay {
     }
 }
 
-/// Eight triangles in scaled coordinates, structure of arrays.
-#[repr(C, align(32))]
+/// Eight triangles in normalised coordinates, structure of arrays.
+#[repr(C, align(64))]
 #[derive(Clone, Copy, Debug)]
 pub struct Pack {
     /// By vertex and axis.
@@ -88,19 +94,43 @@ pub struct Pack {
     extent: [f32; 8],
     /// Number of each triangle in its mesh.
     ids: [u32; 8],
+    /// And which mesh that is.
+    instances: [u16; 8],
+    /// 0 where all triangles are what they are; 1 where a vertex may be beside its place, by half a unit in the last place of 1.
+    rounding: f32,
+}
+
+/// A triangle for a pack.
+pub struct PackTriangle {
+    /// Which mesh it is of.
+    pub instance: u16,
+    /// Its number in that.
+    pub id: u32,
+    /// In normalised coordinates.
+    pub vertices: [Vec3; 3],
+    /// Whether these are what they are in the mesh, but for a power of two.
+    pub is_exact: bool,
 }
 
 impl Pack {
-    /// Up to eight triangles, each three vertices in scaled coordinates, with their numbers.
-    pub fn new(triangles: impl IntoIterator<Item = (u32, [Vec3; 3])>) -> Self {
-        let mut pack = Self { vertices: [[[0.0; 8]; 3]; 3], extent: [f32::NEG_INFINITY; 8], ids: [u32::MAX; 8] };
-        for (slot, (id, vertices)) in triangles.into_iter().take(8).enumerate() {
+    /// Up to eight triangles.
+    pub fn new(triangles: impl IntoIterator<Item = PackTriangle>) -> Self {
+        let mut pack = Self {
+            vertices: [[[0.0; 8]; 3]; 3],
+            extent: [f32::NEG_INFINITY; 8],
+            ids: [u32::MAX; 8],
+            instances: [u16::MAX; 8],
+            rounding: 0.0,
+        };
+        for (slot, PackTriangle { instance, id, vertices, is_exact }) in triangles.into_iter().take(8).enumerate() {
             for (vertex, axis) in (0..3).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
                 pack.vertices[vertex][axis][slot] = vertices[vertex][axis];
             }
             let [a, b, c] = vertices.map(Vec3::as_dvec3);
             pack.extent[slot] = (max_abs(a - b).max(max_abs(b - c)).max(max_abs(c - a)) as f32).next_up();
             pack.ids[slot] = id;
+            pack.instances[slot] = instance;
+            pack.rounding = if is_exact { pack.rounding } else { 1.0 };
         }
         pack
     }
@@ -110,12 +140,24 @@ impl Pack {
         identity.floats(self.vertices.as_flattened().as_flattened());
         identity.floats(&self.extent);
         identity.numbers(&self.ids);
+        identity.numbers(&self.instances.map(u32::from));
+        identity.floats(&[self.rounding]);
     }
 
-    /// Number of the triangle in a place.
+    /// The mesh and the number there of the triangle in a place.
+    ///
+    /// # Safety
+    /// The place is below 8.
     #[inline(always)]
-    pub fn id(&self, slot: usize) -> u32 {
-        self.ids[slot]
+    pub unsafe fn id(&self, slot: usize) -> (u32, u32) {
+        // SAFETY: by this function's own condition.
+        unsafe { (u32::from(*self.instances.get_unchecked(slot)), *self.ids.get_unchecked(slot)) }
+    }
+
+    /// Whether all triangles are what they are in their mesh, but for a power of two: only then are hits right.
+    #[inline(always)]
+    pub fn is_exact(&self) -> bool {
+        self.rounding == 0.0
     }
 
     /// Where a ray in scaled coordinates hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
@@ -152,7 +194,7 @@ impl Pack {
     ///
     /// The test is that of `shape::triangle` in f32: vertices are sheared so that the ray becomes the z axis, and the signs of the edge functions
     /// decide. With u = 2^-24, E the extent and M = 1 + |origin| (coordinates are at most 1): vertex minus origin is wrong by up to 2 u M,
-    /// as the origin is rounded too, and a sheared coordinate by d = 8 u M. Where the line meets the triangle, sheared coordinates are at most 2 E, since
+    /// as both may be rounded too, and a sheared coordinate by d = 11 u M, as the shear is by 4 u. Where the line meets the triangle, sheared coordinates are at most 2 E, since
     /// they surround 0, so that an edge function is wrong by up to 8 E d + 2 d^2 for its arguments and 4 u (2 E + d)^2 for its own rounding:
     /// with E <= 2 M less than 128 u M (E + 4 u M), the slack.
     ///
@@ -177,10 +219,10 @@ impl Pack {
 
     /// Bit i is set unless the ray certainly meets the plane of triangle i behind its start: rays that leave a surface always pass near what they left.
     ///
-    /// Signs of products of the normal n = p x q decide, with p and q edges from vertex a. With u, E and M as in [`Self::candidates`]: p and q are wrong by u E, a component of n
-    /// by 8 u E^2 and at most 2 E^2 itself, and a minus the origin by 2 u M and at most M itself, so that its product with n is wrong by up to
-    /// 3 M 8 u E^2 + 3 (2 E^2) 2 u M + 18 u M E^2 = 54 u M E^2, and n's product with the direction in proportion to its largest component by less. The error allowed for
-    /// is 64 u M E^2.
+    /// Signs of products of the normal n = p x q decide, with p and q edges from vertex a. With u, E and M as in [`Self::candidates`], D the largest component of a minus the
+    /// origin, and R = 1 where vertices are rounded, else 0: p and q are wrong by u (E + 2 R), a component of n by 8 u (E + R) (E + u R) and at most 2 E^2 itself, and a minus the
+    /// origin by u (M + D), so that its product with n is wrong by up to 24 u D (E + R) (E + u R) + 6 u (M + D) E^2 + 18 u D E^2. The error allowed for is
+    /// (16 u M E + 48 u D (E + R)) (E + 4 u R), and for n's product with the direction, in proportion to its largest component, 64 u (E + R) (E + 4 u R).
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
@@ -199,9 +241,11 @@ impl Pack {
             let (ax, ay, az) = (ax.sub(L::splat(ray.origin[0])), ay.sub(L::splat(ray.origin[1])), az.sub(L::splat(ray.origin[2])));
             let approach = z.add(x.mul(L::splat(ray.shear[0]))).add(y.mul(L::splat(ray.shear[1])));
             let distance = ax.mul(x).add(ay.mul(y)).add(az.mul(z)).signed(approach).signed(L::splat(ray.forward));
-            let extent = L::load(&self.extent);
-            let error = extent.mul(extent).mul(L::splat(ray.slack * 0.5));
-            L::splat(0.0).le(distance.add(error)) | approach.abs().le(error)
+            let (extent, apart) = (L::load(&self.extent), ax.abs().max(ay.abs()).max(az.abs()));
+            let (rounded, least) = (extent.add(L::splat(self.rounding)), extent.add(L::splat(self.rounding * (4.0 * UNIT))));
+            let error = extent.mul(L::splat(ray.slack * 0.125)).add(apart.mul(L::splat(48.0 * UNIT)).mul(rounded)).mul(least);
+            let level = rounded.mul(least).mul(L::splat(64.0 * UNIT));
+            L::splat(0.0).le(distance.add(error)) | approach.abs().le(level)
         }
     }
 }

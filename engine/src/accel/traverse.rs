@@ -32,9 +32,8 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     }
     // SAFETY: by this function's own conditions.
     unsafe {
-        let origin = [L::splat(ray.origin.x), L::splat(ray.origin.y), L::splat(ray.origin.z)];
-        let inverse_near = [L::splat(ray.inverse_near.x), L::splat(ray.inverse_near.y), L::splat(ray.inverse_near.z)];
-        let inverse_far = [L::splat(ray.inverse_far.x), L::splat(ray.inverse_far.y), L::splat(ray.inverse_far.z)];
+        let [origin, inverse_near, inverse_far] =
+            [ray.origin, ray.inverse_near, ray.inverse_far].map(|[x, y, z, _]| [L::splat(x), L::splat(y), L::splat(z)]);
         let near = near_bounds(ray.negative);
         let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
         let stack = stack.as_mut_ptr().cast::<u64>();

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3, Vec4};
 
 use crate::{
-    accel::{LeafRule, MOST_LISTED_SPHERES, MeshHit, MeshTree, Pencil, Simd, SphereList, Tree},
+    accel::{LeafRule, MOST_LISTED_SPHERES, MeshHit, Pencil, Simd, SphereList, Tree, Triangles},
     light::Light,
     math::{UNIT, max_abs},
     shape::{Bounds, Cuboid, Disc, Other, Plane, Ray, Sphere, triangle::geometric_normal},
@@ -54,16 +54,18 @@ pub struct Instance {
     pub masked: bool,
 }
 
-/// Triangles, their tree, and what they carry.
+/// Triangles and what they carry.
 #[derive(Debug)]
 pub struct Mesh {
-    pub tree: MeshTree,
+    pub triangles: Triangles,
+    /// For instances that do not stand in the tree of the world; `None` where there are none.
+    pub tree: Option<Tree>,
     pub normals: Vec<[f32; 3]>,
     pub uvs: Vec<[f32; 2]>,
     pub colors: Vec<[f32; 4]>,
 }
 
-/// Which table a leaf of the top-level tree refers to; stands above the index in a reference.
+/// Which table a leaf of the world's tree refers to that is no pack of triangles; stands above the index in a reference.
 pub mod kind {
     pub const SPHERE: u32 = 0;
     pub const CUBOID: u32 = 1;
@@ -74,7 +76,7 @@ pub mod kind {
     pub const PLANE: u32 = 5;
     pub const OTHER: u32 = 6;
     /// Bits of the index.
-    pub const SHIFT: u32 = 28;
+    pub const SHIFT: u32 = 27;
     pub const INDEX: u32 = (1 << SHIFT) - 1;
 }
 
@@ -101,34 +103,17 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Builds the tree over all finite shapes, or all but a few spheres, and prepares those for rays from the eye and towards lights. `is_clear`
-    /// tells materials that cast no shadow.
+    /// Builds all trees, and prepares spheres, where they are few, for rays from the eye and towards lights. `is_clear` tells materials that cast no shadow.
     pub fn finish(&mut self, eye: DVec3, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
         self.instances.shrink_to_fit();
         self.spheres.sort_by_key(|sphere| is_clear(sphere.material));
-        let mut boxes = Vec::new();
-        let mut references = Vec::new();
-        let mut add = |kind: u32, bounds: &mut dyn Iterator<Item = Bounds>| {
-            for (index, bounds) in bounds.enumerate() {
-                boxes.push(bounds);
-                references.push(kind << kind::SHIFT | index as u32);
-            }
-        };
         let spheres: Vec<Sphere> = self.spheres.iter().map(|s| s.shape).collect();
         let few = !spheres.is_empty() && spheres.len() <= MOST_LISTED_SPHERES;
         self.list = few.then(|| SphereList::new(&spheres));
         self.from_eye = few.then(|| Pencil::new(eye, &spheres));
         let blockers = &spheres[..self.spheres.partition_point(|sphere| !is_clear(sphere.material))];
         self.from_lights = lights.iter().map(|light| light.position().filter(|_| few).map(|place| Pencil::new(place, blockers))).collect();
-        add(kind::SPHERE, &mut spheres.iter().filter(|_| !few).map(Sphere::bounds));
-        add(kind::CUBOID, &mut self.cuboids.iter().map(|s| s.shape.bounds()));
-        add(kind::DISC, &mut self.discs.iter().map(|s| s.shape.bounds()));
-        add(kind::OTHER, &mut self.others.iter().map(|s| s.shape.bounds()));
-        add(kind::TRANSFORMED, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
-        add(kind::MESH, &mut self.instances.iter().map(|s| s.shape.transform.bounds_of(&self.meshes[s.shape.mesh as usize].tree)));
-        let listed = spheres.iter().filter(|_| few).map(Sphere::bounds);
-        self.bounds = boxes.iter().copied().chain(listed).reduce(Bounds::union);
-        self.tree = (!boxes.is_empty()).then(|| Tree::build(boxes, LeafRule { most: 1, cost: 1.0 }, |leaf| references[leaf[0] as usize]));
+        self.plant(LeafRule::MEASURED);
     }
 }
 
@@ -154,6 +139,16 @@ impl Transform {
         usable.then_some(Self { to_world, to_object, is_identity: to_world == DAffine3::IDENTITY, growth_to_world, growth_to_object })
     }
 
+    /// Where it takes things that do not stay where they are.
+    pub fn moved(&self) -> Option<DAffine3> {
+        (!self.is_identity).then_some(self.to_world)
+    }
+
+    /// Largest factors by which a vector's largest component grows on the way to the object, and back.
+    pub fn growths(&self) -> [f64; 2] {
+        [self.growth_to_object, self.growth_to_world]
+    }
+
     /// A ray in the object's coordinates, where there are no listed spheres; `t` keeps its meaning.
     #[inline(always)]
     pub fn of_ray(&self, ray: &Ray) -> Ray {
@@ -167,15 +162,18 @@ impl Transform {
 
     /// A box around the image of a mesh: that of its box, as far as images of the boxes in it reach, which are smaller by far where it is turned (Arvo, "Transforming
     /// Axis-Aligned Bounding Boxes", Graphics Gems, 1990).
-    pub fn bounds_of(&self, mesh: &MeshTree) -> Bounds {
-        let whole = self.bounds(mesh.bounds());
+    pub fn bounds_of(&self, mesh: &Mesh) -> Bounds {
+        let whole = self.bounds(mesh.triangles.bounds());
         let DAffine3 { matrix3, translation } = self.to_world;
         let sizes = DMat3::from_cols(matrix3.x_axis.abs(), matrix3.y_axis.abs(), matrix3.z_axis.abs());
         let mut outline = Bounds::EMPTY;
-        mesh.outline(|Bounds { min, max }| {
+        let add = |Bounds { min, max }: Bounds| {
             let (middle, reach) = (matrix3 * ((min + max) * 0.5) + translation, sizes * ((max - min) * 0.5));
             outline = outline.union(Bounds { min: middle - reach, max: middle + reach });
-        });
+        };
+        if let Some(tree) = &mesh.tree {
+            tree.outline(add);
+        }
         let is_empty = outline == Bounds::EMPTY;
         if is_empty { whole } else { Bounds { min: whole.min.max(outline.min), max: whole.max.min(outline.max) } }
     }
@@ -214,7 +212,7 @@ impl Mesh {
     /// The surface at a hit.
     #[inline]
     pub fn point(&self, hit: &MeshHit) -> MeshPoint {
-        let vertices = self.tree.vertices(hit.triangle);
+        let vertices = self.triangles.vertices(hit.triangle);
         let [a, b, c] = vertices;
         let weights = [1.0 - hit.at.b1 - hit.at.b2, hit.at.b1, hit.at.b2];
         let position = a * weights[0] + b * weights[1] + c * weights[2];
@@ -235,12 +233,13 @@ impl Mesh {
     }
 
     fn interpolate<V: std::ops::Add<Output = V> + std::ops::Mul<f64, Output = V>>(&self, hit: &MeshHit, at: impl Fn(usize) -> V) -> V {
-        let [a, b, c] = self.tree.indices(hit.triangle);
+        let [a, b, c] = self.triangles.indices(hit.triangle);
         at(a) * (1.0 - hit.at.b1 - hit.at.b2) + at(b) * hit.at.b1 + at(c) * hit.at.b2
     }
 
     /// Memory in bytes.
     pub fn bytes(&self) -> usize {
-        self.tree.bytes() + size_of_val(&*self.normals) + size_of_val(&*self.uvs) + size_of_val(&*self.colors)
+        let carried = size_of_val(&*self.normals) + size_of_val(&*self.uvs) + size_of_val(&*self.colors);
+        self.triangles.bytes() + self.tree.as_ref().map_or(0, Tree::bytes) + carried
     }
 }

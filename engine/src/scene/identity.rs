@@ -8,17 +8,14 @@ impl Scene {
     /// things at equal distances, but time does.
     pub fn tree_hash(&self) -> [u8; 32] {
         let mut identity = Identity::new();
-        if let Some(tree) = &self.geometry.tree {
-            tree.identify(&mut identity);
-        }
-        self.geometry.meshes.iter().for_each(|mesh| mesh.tree.identify(&mut identity));
+        self.geometry.trees().for_each(|tree| tree.identify(&mut identity));
         identity.finish()
     }
 
-    /// The same scene with other leaves in the trees of its meshes.
+    /// The same scene with other leaves in its trees.
     #[cfg(test)]
     pub(crate) fn with_leaves(mut self, rule: crate::accel::LeafRule) -> Self {
-        self.geometry.meshes.iter_mut().for_each(|mesh| mesh.tree = mesh.tree.with_leaves(rule));
+        self.geometry.plant(rule);
         self
     }
 }

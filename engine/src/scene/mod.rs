@@ -2,6 +2,7 @@
 
 mod compile;
 mod error;
+mod forest;
 mod geometry;
 mod identity;
 mod outlined;
@@ -11,6 +12,7 @@ mod statistics;
 mod stream;
 mod surface;
 mod tracer;
+mod visit;
 #[cfg(test)]
 mod tests;
 

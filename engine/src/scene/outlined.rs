@@ -1,56 +1,118 @@
-//! Queries of one mesh as functions of their own.
+//! Walks through trees as functions of their own.
 
-use super::{Scene, query::Hit};
+use super::{Scene, query::Hit, visit::Blocked};
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
-    accel::{Baseline, Lanes},
+    accel::{Baseline, Block, Lanes, Tree},
     shape::Ray,
 };
 
-/// Outlined, so that scenes without meshes do not pay for them in registers.
+/// Outlined, so that scenes without meshes do not pay for them in registers, nor what is inside of meshes for what is beside them.
+///
+/// # Safety
+/// The processor has the instructions of the type.
 pub(super) trait Outlined: Lanes {
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool;
+    unsafe fn closest_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit);
+    unsafe fn any_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool;
+    unsafe fn closest_of_leaf(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
+    unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool;
+    unsafe fn closest_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]);
+    unsafe fn any_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], is_blocked: &mut [bool], blocked: &mut impl Blocked);
+}
+
+macro_rules! outlined {
+    ($lanes:ty $(, $features:literal)?) => {
+        impl Outlined for $lanes {
+            #[inline(always)]
+            unsafe fn closest_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit) {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit) {
+                    // SAFETY: by the trait's condition, as below.
+                    unsafe { scene.closest_of_tree_in::<$lanes>(tree, ray, best) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, tree, ray, best) }
+            }
+
+            #[inline(always)]
+            unsafe fn any_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool {
+                    // SAFETY: see above.
+                    unsafe { scene.any_of_tree_in::<$lanes>(tree, ray, blocked) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, tree, ray, blocked) }
+            }
+
+            #[inline(always)]
+            unsafe fn closest_of_leaf(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
+                    // SAFETY: see above.
+                    unsafe { scene.closest_of_leaf_in::<$lanes>(ray, reference, best) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, ray, reference, best) }
+            }
+
+            #[inline(always)]
+            unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+                    // SAFETY: see above.
+                    unsafe { scene.any_of_leaf_in::<$lanes>(ray, reference, blocked) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, ray, reference, blocked) }
+            }
+
+            #[inline(always)]
+            unsafe fn closest_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]) {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]) {
+                    // SAFETY: see above.
+                    unsafe { scene.closest_of_block_in::<$lanes>(tree, room, rays, best) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, tree, room, rays, best) }
+            }
+
+            #[inline(always)]
+            unsafe fn any_of_block(
+                scene: &Scene,
+                tree: &Tree,
+                room: &mut Block,
+                rays: &[Ray],
+                is_blocked: &mut [bool],
+                blocked: &mut impl Blocked,
+            ) {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(
+                    scene: &Scene,
+                    tree: &Tree,
+                    room: &mut Block,
+                    rays: &[Ray],
+                    is_blocked: &mut [bool],
+                    blocked: &mut impl Blocked,
+                ) {
+                    // SAFETY: see above.
+                    unsafe { scene.any_of_block_in::<$lanes>(tree, room, rays, is_blocked, blocked) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, tree, room, rays, is_blocked, blocked) }
+            }
+        }
+    };
 }
 
 #[cfg(target_arch = "x86_64")]
-impl Outlined for Avx2 {
-    #[inline(always)]
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-        #[target_feature(enable = "avx2,bmi1")]
-        #[inline(never)]
-        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-            // SAFETY: this function enables the instructions.
-            unsafe { scene.closest_of_mesh_in::<Avx2>(ray, reference, best) }
-        }
-        // SAFETY: the caller has the instructions.
-        unsafe { outlined(scene, ray, reference, best) }
-    }
-
-    #[inline(always)]
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-        #[target_feature(enable = "avx2,bmi1")]
-        #[inline(never)]
-        unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-            // SAFETY: this function enables the instructions.
-            unsafe { scene.any_of_mesh_in::<Avx2>(ray, reference, blocked) }
-        }
-        // SAFETY: the caller has the instructions.
-        unsafe { outlined(scene, ray, reference, blocked) }
-    }
-}
-
-impl Outlined for Baseline {
-    #[inline(never)]
-    unsafe fn closest_of_mesh(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit) {
-        // SAFETY: every machine has these instructions.
-        unsafe { scene.closest_of_mesh_in::<Baseline>(ray, reference, best) }
-    }
-
-    #[inline(never)]
-    unsafe fn any_of_mesh(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-        // SAFETY: every machine has these instructions.
-        unsafe { scene.any_of_mesh_in::<Baseline>(ray, reference, blocked) }
-    }
-}
+outlined!(Avx2, "avx2,bmi1");
+outlined!(Baseline);

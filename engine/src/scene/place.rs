@@ -9,7 +9,7 @@ use super::{
     geometry::{Geometry, Instance, LocalShape, Mesh, Placed, Transform, Transformed, kind},
 };
 use crate::{
-    accel::{MeshTree, Simd},
+    accel::{Simd, Triangles},
     assets,
     description::{self, AssetId, AssetSource, GroupId, MaterialId, Matrix, MeshData, Model, Object, ObjectKind, Shape, SourceId},
     light::Light,
@@ -238,7 +238,7 @@ impl<'a> Placer<'a> {
 
     fn instance(&mut self, mesh: u32, material: u32, transform: Transform, source: SourceId) -> Result<()> {
         let object = self.next_object(source)?;
-        check_reach(transform.reach(self.geometry.meshes[mesh as usize].tree.bounds()), source)?;
+        check_reach(transform.reach(self.geometry.meshes[mesh as usize].triangles.bounds()), source)?;
         let surface = &self.materials[material as usize];
         let masked = surface.is_masked() || !surface.double_sided;
         self.geometry.instances.push(Placed { shape: Instance { mesh, transform, masked }, object, material });
@@ -302,7 +302,7 @@ impl<'a> Placer<'a> {
         uvs: Vec<[f32; 2]>,
         colors: Vec<[f32; 4]>,
     ) -> u32 {
-        self.geometry.meshes.push(Mesh { tree: MeshTree::build(positions, triangles), normals, uvs, colors });
+        self.geometry.meshes.push(Mesh { triangles: Triangles::new(positions, triangles), tree: None, normals, uvs, colors });
         self.geometry.meshes.len() as u32 - 1
     }
 

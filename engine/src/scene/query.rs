@@ -14,7 +14,7 @@ use super::{
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
-    accel::{Lanes, MeshHit, Pencil, Simd},
+    accel::{Lanes, MeshHit, OTHER, Pencil, Simd},
     shape::{Point, Ray, Sphere, triangle::TriangleHit},
 };
 
@@ -44,10 +44,17 @@ impl Hit {
         Self { t: t_max, object: 0, part: 0, reference: NONE, b1: 0.0, b2: 0.0 }
     }
 
-    /// Of a triangle.
+    /// Of a triangle of an instance.
     #[inline(always)]
-    pub(super) fn of_mesh(hit: &MeshHit, object: u32, reference: u32) -> Self {
+    pub(super) fn of_mesh(hit: &MeshHit, object: u32) -> Self {
+        let reference = kind::MESH << kind::SHIFT | hit.instance;
         Self { t: hit.at.t, object, part: hit.triangle, reference, b1: hit.at.b1, b2: hit.at.b2 }
+    }
+
+    /// Of something else.
+    #[inline(always)]
+    pub(super) fn of_shape(t: f64, object: u32, part: u32, reference: u32) -> Self {
+        Self { t, object, part, reference, b1: 0.0, b2: 0.0 }
     }
 
     /// `None` for the hit of nothing.
@@ -93,12 +100,6 @@ impl Scene {
             }
         }
         self.run(Any(ray, blocks))
-    }
-
-    /// The reference of a mesh that is all there is in the tree.
-    #[inline(always)]
-    pub(super) fn only_mesh(&self) -> Option<u32> {
-        self.geometry.tree.as_ref()?.only_leaf().filter(|reference| reference >> kind::SHIFT == kind::MESH)
     }
 
     pub(super) fn simd(&self) -> Simd {
@@ -180,59 +181,15 @@ impl Scene {
         // SAFETY: the caller has the instructions of `L`.
         let mut best = unsafe { self.closest_beside_tree::<L>(ray, pencil) };
         let Some(tree) = &geometry.tree else { return best };
-        if let Some(reference) = self.only_mesh() {
+        if !geometry.instances.is_empty() {
             // SAFETY: the caller has the instructions of `L`.
-            unsafe { L::closest_of_mesh(self, ray, reference, &mut best) }
+            unsafe { L::closest_of_tree(self, tree, ray, &mut best) };
             return best;
         }
         let boxed = tree.ray::<true>(ray.origin, ray.direction);
         let limit = boxed.limit(best.t);
         let leaf = |reference: u32| {
-            let index = (reference & kind::INDEX) as usize;
-            let simple = |t: f64, object: u32, part: u32| Hit { t, object, part, reference, b1: 0.0, b2: 0.0 };
-            match reference >> kind::SHIFT {
-                kind::SPHERE => {
-                    let sphere = &geometry.spheres[index];
-                    if let Some(t) = sphere.shape.closest::<true>(ray) {
-                        best.offer(simple(t, sphere.object, 0));
-                    }
-                }
-                kind::CUBOID => {
-                    let cuboid = &geometry.cuboids[index];
-                    if let Some((t, face)) = cuboid.shape.closest(ray) {
-                        best.offer(simple(t, cuboid.object, face));
-                    }
-                }
-                kind::DISC => {
-                    let disc = &geometry.discs[index];
-                    if let Some(t) = disc.shape.closest(ray) {
-                        best.offer(simple(t, disc.object, 0));
-                    }
-                }
-                kind::TRANSFORMED => {
-                    let placed = &geometry.transformed[index];
-                    let local = placed.shape.transform.of_ray(ray);
-                    let hit = match &placed.shape.shape {
-                        LocalShape::Sphere(sphere) => sphere.closest::<false>(&local).map(|t| (t, 0)),
-                        LocalShape::Cuboid(cuboid) => cuboid.closest(&local),
-                        LocalShape::Disc(disc) => disc.closest(&local).map(|t| (t, 0)),
-                        LocalShape::Other(other) => other.closest(&local),
-                    };
-                    if let Some((t, part)) = hit {
-                        best.offer(simple(t, placed.object, part));
-                    }
-                }
-                kind::OTHER => {
-                    let other = &geometry.others[index];
-                    if let Some((t, part)) = other.shape.closest(ray) {
-                        best.offer(simple(t, other.object, part));
-                    }
-                }
-                _ => {
-                    // SAFETY: the caller has the instructions of `L`.
-                    unsafe { L::closest_of_mesh(self, ray, reference, &mut best) }
-                }
-            }
+            self.closest_of_shape(ray, reference & !OTHER, &mut best);
             ControlFlow::Continue(boxed.limit(best.t))
         };
         // SAFETY: the caller has the instructions of `L`.
@@ -287,85 +244,20 @@ impl Scene {
             return true;
         }
         let Some(tree) = &geometry.tree else { return false };
-        if let Some(reference) = self.only_mesh() {
+        if !geometry.instances.is_empty() {
             // SAFETY: the caller has the instructions of `L`.
-            return unsafe { L::any_of_mesh(self, ray, reference, &mut blocked) };
+            return unsafe { L::any_of_tree(self, tree, ray, &mut |_, material, t| blocked(material, t)) };
         }
         let boxed = tree.ray::<true>(ray.origin, ray.direction);
         let limit = boxed.limit(ray.t_max);
         let mut found = false;
         let leaf = |reference: u32| {
-            let index = (reference & kind::INDEX) as usize;
-            found = match reference >> kind::SHIFT {
-                kind::SPHERE => {
-                    let sphere = &geometry.spheres[index];
-                    let crossings = sphere.shape.crossings::<true>(ray.origin, ray.direction);
-                    crossings.is_some_and(|[near, far]| blocked(sphere.material, near) || blocked(sphere.material, far))
-                }
-                kind::CUBOID => {
-                    let cuboid = &geometry.cuboids[index];
-                    let crossings = cuboid.shape.crossings(ray.origin, ray.direction);
-                    crossings.is_some_and(|[near, far]| blocked(cuboid.material, near.0) || blocked(cuboid.material, far.0))
-                }
-                kind::DISC => {
-                    let disc = &geometry.discs[index];
-                    disc.shape.closest(ray).is_some_and(|t| blocked(disc.material, t))
-                }
-                kind::TRANSFORMED => {
-                    let placed = &geometry.transformed[index];
-                    let local = placed.shape.transform.of_ray(ray);
-                    let crossings = match &placed.shape.shape {
-                        LocalShape::Sphere(sphere) => sphere.crossings::<false>(local.origin, local.direction),
-                        LocalShape::Cuboid(cuboid) => cuboid.crossings(local.origin, local.direction).map(|[near, far]| [near.0, far.0]),
-                        LocalShape::Disc(disc) => disc.closest(&local).map(|t| [t, f64::INFINITY]),
-                        LocalShape::Other(other) => other.crossings(&local),
-                    };
-                    crossings.is_some_and(|[near, far]| blocked(placed.material, near) || blocked(placed.material, far))
-                }
-                kind::OTHER => {
-                    let other = &geometry.others[index];
-                    other.shape.crossings(ray).is_some_and(|[near, far]| blocked(other.material, near) || blocked(other.material, far))
-                }
-                _ => {
-                    // SAFETY: the caller has the instructions of `L`.
-                    unsafe { L::any_of_mesh(self, ray, reference, &mut blocked) }
-                }
-            };
+            found = self.any_of_shape(ray, reference & !OTHER, &mut blocked);
             if found { ControlFlow::Break(()) } else { ControlFlow::Continue(limit) }
         };
         // SAFETY: the caller has the instructions of `L`.
         unsafe { tree.visit::<L, true>(&boxed, limit, leaf) };
         found
-    }
-
-    /// # Safety
-    /// The processor has the instructions of `L`.
-    #[inline(always)]
-    pub(super) unsafe fn closest_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, best: &mut Hit) {
-        let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
-        let local = Ray { t_max: best.t, ..placed.shape.transform.of_ray(ray) };
-        let visit = |hit: MeshHit| {
-            if !placed.shape.masked || self.is_there(placed, &hit) {
-                best.offer(Hit::of_mesh(&hit, placed.object, reference));
-            }
-            ControlFlow::Continue(best.t)
-        };
-        // SAFETY: the caller has the instructions of `L`.
-        let _: ControlFlow<()> = unsafe { self.geometry.meshes[placed.shape.mesh as usize].tree.hits::<L, false>(&local, visit) };
-    }
-
-    /// # Safety
-    /// The processor has the instructions of `L`.
-    #[inline(always)]
-    pub(super) unsafe fn any_of_mesh_in<L: Lanes>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
-        let placed = &self.geometry.instances[(reference & kind::INDEX) as usize];
-        let local = placed.shape.transform.of_ray(ray);
-        let visit = |hit: MeshHit| {
-            let there = !placed.shape.masked || self.is_there(placed, &hit);
-            if there && blocked(placed.material, hit.at.t) { ControlFlow::Break(()) } else { ControlFlow::Continue(ray.t_max) }
-        };
-        // SAFETY: the caller has the instructions of `L`.
-        unsafe { self.geometry.meshes[placed.shape.mesh as usize].tree.hits::<L, true>(&local, visit) }.is_break()
     }
 
     /// Whether a mesh has a surface at a hit: not cut away by its alpha mask, nor seen from a back that it does not have.
@@ -442,7 +334,7 @@ impl Scene {
     fn mesh_surface(&self, hit: &Hit, index: usize) -> Surface {
         let placed = &self.geometry.instances[index];
         let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
-        let at = MeshHit { triangle: hit.part, at: TriangleHit { t: hit.t, b1: hit.b1, b2: hit.b2, front: true } };
+        let at = MeshHit { instance: index as u32, triangle: hit.part, at: TriangleHit { t: hit.t, b1: hit.b1, b2: hit.b2, front: true } };
         let local = mesh.point(&at);
         let transform = &placed.shape.transform;
         let point = transform.to_world.transform_point3(local.position);

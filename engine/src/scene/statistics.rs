@@ -1,7 +1,7 @@
 //! What a scene is made of, in numbers.
 
 use super::geometry::{Geometry, LocalShape};
-use crate::shape::Other;
+use crate::{accel::Tree, shape::Other};
 
 /// Counts of a compiled scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,7 +30,7 @@ pub struct Statistics {
     pub instanced_triangles: usize,
     /// Memory of meshes, their instances and trees in bytes.
     pub bytes: usize,
-    /// Nodes on the longest way through the tree of any mesh.
+    /// Nodes on the longest way through any tree.
     pub depth: usize,
 }
 
@@ -43,7 +43,7 @@ impl Statistics {
             _ => None,
         }));
         let others = |is: fn(&Other) -> bool| others.clone().filter(|other| is(other)).count();
-        let triangles = |mesh: u32| geometry.meshes[mesh as usize].tree.count();
+        let triangles = |mesh: u32| geometry.meshes[mesh as usize].triangles.count();
         Self {
             spheres: geometry.spheres.len() + transformed(|shape| matches!(shape, LocalShape::Sphere(_))),
             planes: geometry.planes.len(),
@@ -54,13 +54,13 @@ impl Statistics {
             cones: others(|other| matches!(other, Other::Cone(cone) if !cone.is_cylinder())),
             meshes: geometry.meshes.len(),
             instances: geometry.instances.len(),
-            triangles: geometry.meshes.iter().map(|mesh| mesh.tree.count()).sum(),
+            triangles: geometry.meshes.iter().map(|mesh| mesh.triangles.count()).sum(),
             instanced_triangles: geometry.instances.iter().map(|placed| triangles(placed.shape.mesh)).sum(),
             bytes: geometry.meshes.iter().map(|mesh| mesh.bytes()).sum::<usize>()
                 + size_of_val(&*geometry.instances)
                 + geometry.tree.as_ref().map_or(0, |tree| tree.bytes())
                 + geometry.list.as_ref().map_or(0, |list| list.bytes()),
-            depth: geometry.meshes.iter().map(|mesh| mesh.tree.depth()).max().unwrap_or(0),
+            depth: geometry.trees().map(Tree::depth).max().unwrap_or(0),
         }
     }
 }

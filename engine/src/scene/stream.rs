@@ -1,149 +1,125 @@
 //! Many rays against the scene at a time.
 
+use std::marker::PhantomData;
+
 use super::{
     Scene,
-    geometry::{Instance, Placed, kind},
+    outlined::Outlined,
     query::Hit,
     surface::Crossing,
+    visit::{Any, Blocked, Closest},
 };
-#[cfg(target_arch = "x86_64")]
-use crate::accel::Avx2;
 use crate::{
-    accel::{BLOCK, Baseline, Block, Lanes, MeshHit, MeshTree},
+    accel::{BLOCK, Block, Tree},
     shape::Ray,
 };
-use glam::DVec3;
-
-/// [`MeshTree::stream`] as a function of its own.
-pub(super) trait Streams: Lanes {
-    unsafe fn stream<const ANY: bool>(tree: &MeshTree, block: &mut Block, rays: &mut [Ray], visit: impl FnMut(usize, MeshHit) -> f64);
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Streams for Avx2 {
-    #[inline(always)]
-    unsafe fn stream<const ANY: bool>(tree: &MeshTree, block: &mut Block, rays: &mut [Ray], visit: impl FnMut(usize, MeshHit) -> f64) {
-        #[target_feature(enable = "avx2,bmi1")]
-        #[inline(never)]
-        unsafe fn outlined<const ANY: bool>(
-            tree: &MeshTree,
-            block: &mut Block,
-            rays: &mut [Ray],
-            visit: impl FnMut(usize, MeshHit) -> f64,
-        ) {
-            // SAFETY: this function enables the instructions.
-            unsafe { tree.stream::<Avx2, ANY>(block, rays, visit) }
-        }
-        // SAFETY: the caller has the instructions.
-        unsafe { outlined::<ANY>(tree, block, rays, visit) }
-    }
-}
-
-impl Streams for Baseline {
-    #[inline(never)]
-    unsafe fn stream<const ANY: bool>(tree: &MeshTree, block: &mut Block, rays: &mut [Ray], visit: impl FnMut(usize, MeshHit) -> f64) {
-        // SAFETY: every machine has these instructions.
-        unsafe { tree.stream::<Baseline, ANY>(block, rays, visit) }
-    }
-}
 
 impl Scene {
-    /// Nearest hits of many rays, each handed over once, in order; whether the scene is one that this can be done with, and so it was.
+    /// Nearest hits of many rays, each handed over once, in order; whether the scene is one where this is faster than one by one, and so it was done.
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub(super) unsafe fn hits_in<L: Streams>(&self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) -> bool {
-        let Some(reference) = self.only_mesh() else { return false };
-        let placed = self.placed(reference);
-        let (mut room, mut local) = (Block::new(), LocalRays::new());
+    pub(super) unsafe fn hits_in<L: Outlined>(&self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) -> bool {
+        let Some(tree) = self.tree_for_streams() else { return false };
+        let mut room = Block::new();
         for (block, rays) in rays.chunks(BLOCK).enumerate() {
             let mut best = [Hit::none(0.0); BLOCK];
             for (best, ray) in best.iter_mut().zip(rays) {
                 // SAFETY: the caller has the instructions of `L`.
                 *best = unsafe { self.closest_beside_tree::<L>(ray, None) };
             }
-            local.fill(placed, rays, |ray| best[ray].t);
-            let visit = |ray: usize, hit: MeshHit| {
-                if !placed.shape.masked || self.is_there(placed, &hit) {
-                    best[ray].offer(Hit::of_mesh(&hit, placed.object, reference));
-                }
-                best[ray].t
-            };
             // SAFETY: the caller has the instructions of `L`.
-            unsafe { L::stream::<false>(self.tree_of(placed), &mut room, local.all(), visit) };
+            unsafe { L::closest_of_block(self, tree, &mut room, rays, &mut best) };
             best.iter().take(rays.len()).enumerate().for_each(|(ray, best)| found(block * BLOCK + ray, best.some()));
         }
         true
     }
 
-    /// Whether anything stands in the way of each of many rays, handed over once, in order; whether the scene is one that this can be done with, and so it was.
+    /// Whether anything stands in the way of each of many rays, handed over once, in order; whether the scene is one where this is faster than one by one, and so it
+    /// was done.
     ///
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub(super) unsafe fn any_of_in<L: Streams>(
+    pub(super) unsafe fn any_of_in<L: Outlined>(
         &self,
         rays: &[Ray],
         blocks: &mut impl FnMut(usize, u32, &Crossing) -> bool,
         mut found: impl FnMut(usize, bool),
     ) -> bool {
-        let Some(reference) = self.only_mesh() else { return false };
-        let placed = self.placed(reference);
-        let (mut room, mut local) = (Block::new(), LocalRays::new());
+        let Some(tree) = self.tree_for_streams() else { return false };
+        let mut room = Block::new();
         for (block, rays) in rays.chunks(BLOCK).enumerate() {
             let mut is_blocked = [false; BLOCK];
-            let mut blocked =
-                |ray: usize, material: u32, t: f64| t < rays[ray].t_max && blocks(block * BLOCK + ray, material, &Crossing { t });
-            for (number, ray) in rays.iter().enumerate() {
-                let mut blocked = |material, t| t > 0.0 && blocked(number, material, t);
-                // SAFETY: the caller has the instructions of `L`.
-                is_blocked[number] = unsafe { self.any_beside_tree::<L>(ray, None, &mut blocked) };
-            }
-            local.fill(placed, rays, |ray| if is_blocked[ray] { -1.0 } else { rays[ray].t_max });
-            let visit = |ray: usize, hit: MeshHit| {
-                let there = !placed.shape.masked || self.is_there(placed, &hit);
-                is_blocked[ray] = there && blocked(ray, placed.material, hit.at.t);
-                if is_blocked[ray] { -1.0 } else { rays[ray].t_max }
+            let mut blocked = |ray: usize, material: u32, t: f64| {
+                t > 0.0 && t < rays[ray].t_max && blocks(block * BLOCK + ray, material, &Crossing { t })
             };
+            for (number, ray) in rays.iter().enumerate() {
+                // SAFETY: the caller has the instructions of `L`.
+                is_blocked[number] = unsafe { self.any_beside_tree::<L>(ray, None, &mut |material, t| blocked(number, material, t)) };
+            }
             // SAFETY: the caller has the instructions of `L`.
-            unsafe { L::stream::<true>(self.tree_of(placed), &mut room, local.all(), visit) };
+            unsafe { L::any_of_block(self, tree, &mut room, rays, &mut is_blocked, &mut blocked) };
             is_blocked.iter().take(rays.len()).enumerate().for_each(|(ray, is_blocked)| found(block * BLOCK + ray, *is_blocked));
         }
         true
     }
 
-    fn placed(&self, reference: u32) -> &Placed<Instance> {
-        &self.geometry.instances[(reference & kind::INDEX) as usize]
+    fn tree_for_streams(&self) -> Option<&Tree> {
+        self.geometry.tree.as_ref().filter(|_| !self.geometry.instances.is_empty())
     }
 
-    fn tree_of(&self, placed: &Placed<Instance>) -> &MeshTree {
-        &self.geometry.meshes[placed.shape.mesh as usize].tree
-    }
-}
-
-/// A block of rays in the coordinates of an instance.
-struct LocalRays {
-    rays: [Ray; BLOCK],
-    count: usize,
-}
-
-impl LocalRays {
+    /// # Safety
+    /// The processor has the instructions of `L`.
     #[inline(always)]
-    fn new() -> Self {
-        Self { rays: [Ray::new(DVec3::ZERO, DVec3::X); BLOCK], count: 0 }
+    pub(super) unsafe fn closest_of_block_in<L: Outlined>(&self, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]) {
+        let mut limits = [0.0; BLOCK];
+        limits.iter_mut().zip(&*best).for_each(|(limit, best)| *limit = best.t);
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { tree.stream::<L, false>(room, rays, &limits, Closest::<L> { scene: self, rays, best, lanes: PhantomData }) };
     }
 
+    /// # Safety
+    /// The processor has the instructions of `L`.
     #[inline(always)]
-    fn fill(&mut self, placed: &Placed<Instance>, rays: &[Ray], t_max: impl Fn(usize) -> f64) {
-        self.count = rays.len();
-        for (number, (local, ray)) in self.rays.iter_mut().zip(rays).enumerate() {
-            *local = Ray { t_max: t_max(number), ..placed.shape.transform.of_ray(ray) };
+    pub(super) unsafe fn any_of_block_in<L: Outlined>(
+        &self,
+        tree: &Tree,
+        room: &mut Block,
+        rays: &[Ray],
+        is_blocked: &mut [bool],
+        blocked: &mut impl Blocked,
+    ) {
+        let mut limits = [0.0; BLOCK];
+        for (limit, (ray, is_blocked)) in limits.iter_mut().zip(rays.iter().zip(&*is_blocked)) {
+            *limit = if *is_blocked { -1.0 } else { ray.t_max };
         }
+        let visitor = Any::<L, _> { scene: self, rays, is_blocked, blocked, lanes: PhantomData };
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { tree.stream::<L, true>(room, rays, &limits, visitor) };
     }
 
+    /// # Safety
+    /// The processor has the instructions of `L`.
     #[inline(always)]
-    fn all(&mut self) -> &mut [Ray] {
-        &mut self.rays[..self.count]
+    pub(super) unsafe fn closest_of_tree_in<L: Outlined>(&self, tree: &Tree, ray: &Ray, best: &mut Hit) {
+        let limit = best.t;
+        let (rays, best) = (std::slice::from_ref(ray), std::slice::from_mut(best));
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe { tree.walk::<L, false>(ray, limit, &mut Closest::<L> { scene: self, rays, best, lanes: PhantomData }) };
+    }
+
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    #[inline(always)]
+    pub(super) unsafe fn any_of_tree_in<L: Outlined>(&self, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool {
+        let mut is_blocked = false;
+        let (rays, one) = (std::slice::from_ref(ray), std::slice::from_mut(&mut is_blocked));
+        // SAFETY: the caller has the instructions of `L`.
+        unsafe {
+            tree.walk::<L, true>(ray, ray.t_max, &mut Any::<L, _> { scene: self, rays, is_blocked: one, blocked, lanes: PhantomData })
+        };
+        is_blocked
     }
 }

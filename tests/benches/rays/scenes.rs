@@ -1,9 +1,11 @@
-//! What rays are traced through: a scan-like mesh, architecture, hair, a field of instances, and a real scan where `TESSERA_MODELS` names a folder that has it.
+//! What rays are traced through: a scan-like mesh, architecture, hair, a field of instances, and real models where `TESSERA_MODELS` names a folder that has them: a scan,
+//! and two machines of many parts, each of which is one mesh for Embree.
 
 use std::{f64::consts::TAU, fs, path::Path};
 
 use glam::{DMat3, DQuat, DVec2, DVec3};
 use tessera_engine::{
+    assets,
     description::{Frame, Group, Matrix, MemoryAssets, Model as File, ModelFormat, Object, ObjectKind, SourceId},
     scene::Scene,
 };
@@ -23,18 +25,30 @@ pub struct Model {
     pub lamp: DVec3,
     /// Where the triangles are shown; once, where they are, if nowhere.
     pub places: Vec<Matrix>,
+    /// A file of glTF that Tessera reads instead of these triangles.
+    gltf: Option<Vec<u8>>,
 }
 
 /// All scenes, made one after the other.
 pub fn all() -> impl Iterator<Item = Model> {
-    let makers: [fn() -> Option<Model>; 5] = [|| Some(knot()), || Some(hall()), || Some(needles()), || Some(field()), bunny];
+    let makers: [fn() -> Option<Model>; 7] = [|| Some(knot()), || Some(hall()), || Some(needles()), || Some(field()), bunny, engine, truck];
     makers.into_iter().filter_map(|make| make())
 }
 
 impl Model {
     fn new(name: &'static str, eye: [f64; 3], look_at: [f64; 3], half_view: f64, lamp: [f64; 3]) -> Self {
         let (positions, triangles) = (Vec::new(), Vec::new());
-        Self { name, positions, triangles, eye: eye.into(), look_at: look_at.into(), half_view, lamp: lamp.into(), places: Vec::new() }
+        Self {
+            name,
+            positions,
+            triangles,
+            eye: eye.into(),
+            look_at: look_at.into(),
+            half_view,
+            lamp: lamp.into(),
+            places: Vec::new(),
+            gltf: None,
+        }
     }
 
     /// The diagonal of its box.
@@ -49,10 +63,11 @@ impl Model {
     /// The scene that Tessera makes of it, by way of a file.
     pub fn compile(&self) -> Scene {
         let mut assets = MemoryAssets::default();
-        let file = assets.insert(self.ply());
-        let model = File { format: ModelFormat::Ply, file, parts: Vec::new() };
+        let (format, bytes) = self.gltf.clone().map_or_else(|| (ModelFormat::Ply, self.ply()), |bytes| (ModelFormat::Gltf, bytes));
+        let model = File { format, file: assets.insert(bytes), parts: Vec::new() };
+        // Of a material that is seen from both sides, as everything is for Embree.
         let object = |transform: Option<Matrix>| {
-            let kind = ObjectKind::Model { model: model.clone(), material: None };
+            let kind = ObjectKind::Model { model: model.clone(), material: Some(0) };
             Object { kind, transform, source: SourceId::default() }
         };
         let places = self.places.iter().map(|place| object(Some(*place)));
@@ -250,5 +265,38 @@ fn bunny() -> Option<Model> {
             _ => {}
         }
     }
+    Some(model)
+}
+
+/// Two cylinders and all that they move: 122,000 triangles of 79 parts, many of them turned.
+fn engine() -> Option<Model> {
+    machine("engine", "2CylinderEngine.glb", [-0.3, -0.9, 0.5])
+}
+
+/// A milk truck.
+fn truck() -> Option<Model> {
+    machine("truck", "CesiumMilkTruck.glb", [0.6, -0.7, 0.8])
+}
+
+/// A model of many meshes, seen from a direction.
+fn machine(name: &'static str, file: &str, from: [f64; 3]) -> Option<Model> {
+    let bytes = fs::read(Path::new(&std::env::var_os("TESSERA_MODELS")?).join(file)).expect("the model can be read");
+    let mut assets = MemoryAssets::default();
+    let file = File { format: ModelFormat::Gltf, file: assets.insert(bytes.clone()), parts: Vec::new() };
+    let loaded = assets::load(&file, &assets).expect("the model is right");
+    let mut model = Model { gltf: Some(bytes), ..Model::new(name, [0.0; 3], [0.0; 3], 0.45, [0.0; 3]) };
+    for instance in &loaded.instances {
+        let mesh = &loaded.meshes[instance.mesh];
+        let first = model.positions.len() as u32;
+        for position in &mesh.positions {
+            model.vertex(instance.transform.transform_point3(DVec3::from(position.map(f64::from))));
+        }
+        model.triangles.extend(mesh.triangles.iter().map(|triangle| triangle.map(|vertex| first + vertex)));
+    }
+    let points = model.positions.iter().map(|p| DVec3::from(p.map(f64::from)));
+    let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
+    model.look_at = (low + high) * 0.5;
+    model.eye = model.look_at + DVec3::from(from).normalize() * (high - low).length();
+    model.lamp = model.look_at + DVec3::new(0.3, -0.4, 0.9) * (high - low).length();
     Some(model)
 }

@@ -30,7 +30,7 @@ fn nearest(geometry: &Geometry, ray: &Ray) -> Option<(f64, u32)> {
     }));
     for p in &geometry.instances {
         let local = ray.transformed(&p.shape.transform.to_object);
-        let (sheared, mesh) = (Sheared::new(local.origin, local.direction), &geometry.meshes[p.shape.mesh as usize].tree);
+        let (sheared, mesh) = (Sheared::new(local.origin, local.direction), &geometry.meshes[p.shape.mesh as usize].triangles);
         let of_triangle = |triangle| Some((sheared.hit(sheared.turned(mesh.vertices(triangle)))?.t, p.object));
         hits.extend((0..mesh.count() as u32).filter_map(of_triangle).filter(|(t, _)| *t < ray.t_max));
     }
@@ -150,7 +150,7 @@ fn slivers() -> (Scene, Vec<Ray>) {
     let mut maker = Maker::default();
     maker.mesh(&mesh, DAffine3::IDENTITY);
     let scene = maker.compile();
-    assert!(scene.geometry.meshes[0].tree.is_split());
+    assert!(scene.geometry.tree.as_ref().unwrap().is_split());
     rays.extend(rays_of(&scene, 1_000));
     (scene, rays)
 }
@@ -165,7 +165,7 @@ fn split_triangles_are_hit_as_without_a_tree() {
 #[test]
 fn a_split_triangle_is_crossed_once() {
     let (scene, rays) = slivers();
-    let mesh = &scene.geometry.meshes[0].tree;
+    let mesh = &scene.geometry.meshes[0].triangles;
     let mut expected = Vec::new();
     for ray in &rays {
         let sheared = Sheared::new(ray.origin, ray.direction);
@@ -245,6 +245,40 @@ fn distant_and_broken_rays_in_streams_find_what_they_find_alone() {
             }
         }
         check_streams(&mut scene, &rays);
+    }
+}
+
+/// Balls, turned and scaled, near the origin and far from it, twice or so each: their triangles stand in the tree of the world, but for those of one that is stretched, and of
+/// one that is there too often. From near and far, singly and in streams.
+#[test]
+fn triangles_of_moved_meshes_are_hit_as_without_a_tree() {
+    for (seed, middle) in [(41, DVec3::ZERO), (42, DVec3::new(300.0, -20.0, 1e4))] {
+        let (mut random, mut maker) = (Random(seed), Maker::default());
+        for kind in 0..12 {
+            let mesh = ball(6 + kind, 10, 0.2);
+            let times = if kind == 5 { 40 } else { 1 + kind % 2 };
+            for _ in 0..times {
+                let turn = glam::DQuat::from_axis_angle(random.direction(), random.unit() * 6.0);
+                let stretch = if kind == 4 { DVec3::new(9.0, 0.5, 0.5) } else { DVec3::splat(0.2 + random.unit()) };
+                maker.mesh(&mesh, DAffine3::from_scale_rotation_translation(stretch, turn, middle + random.point() * 3.0));
+            }
+        }
+        let still = ball(20, 20, 0.1);
+        maker.mesh(&still, DAffine3::IDENTITY);
+        maker.add(Shape::Sphere { center: (middle + DVec3::X * 4.0).into(), radius: 1.0 }, DAffine3::IDENTITY);
+        let mut scene = maker.compile();
+        let of_their_own = scene.geometry.meshes.iter().filter(|mesh| mesh.tree.is_some()).count();
+        assert_eq!(of_their_own, 2, "meshes that have a tree of their own");
+        let mut rays = Vec::new();
+        for i in 0..6_000 {
+            let origin = middle + random.point() * [4.0, 30.0, 1e4, 1e8][i % 4];
+            let target = if i % 16 == 0 { random.point() } else { middle + random.point() * 3.5 };
+            let t_max = if i % 5 == 0 { random.unit() * 8.0 } else { f64::INFINITY };
+            rays.push(Ray { t_max, ..Ray::new(origin, (target - origin).normalize()) });
+        }
+        let hits = rays.iter().filter(|ray| scene.closest(ray).is_some()).count();
+        assert!(hits > rays.len() / 4, "{hits}");
+        check(&mut scene, &rays);
     }
 }
 

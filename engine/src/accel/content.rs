@@ -1,0 +1,183 @@
+//! What a tree is built over: triangles of meshes at their places, and boxes of other things.
+
+use glam::{DAffine3, DVec3, Vec3};
+
+use super::{
+    build::{Box3, Draft},
+    collapse::{Collapse, LeafRule},
+    frame::Normalisation,
+    pack::{Pack, PackTriangle},
+    split::{References, split},
+    tree::{OTHER, Tree},
+    triangles::Triangles,
+};
+use crate::{math::max_abs, shape::Bounds};
+
+/// A mesh at its place.
+pub struct Part<'a> {
+    /// Its triangles.
+    pub triangles: &'a Triangles,
+    /// Where they stand; `None` where they are.
+    pub to_world: Option<DAffine3>,
+}
+
+/// All that a tree is over: at least one triangle or box. All are finite.
+pub struct Content<'a> {
+    /// Instances, by their numbers; at most 2^16, of less than 2^29 triangles.
+    pub parts: Vec<Part<'a>>,
+    /// Boxes of other things.
+    pub boxes: Vec<Bounds>,
+    /// What the references of these boxes hold, 30 bits each.
+    pub references: Vec<u32>,
+}
+
+/// The centre of triangles that stand in a tree as they are may be so many times farther from the origin than they are large: boxes get coarser then.
+const NEAR: f64 = 16.0;
+
+impl<'a> Content<'a> {
+    /// Triangles of one mesh, where they are.
+    pub fn of(triangles: &'a Triangles) -> Self {
+        Self { parts: vec![Part { triangles, to_world: None }], boxes: Vec::new(), references: Vec::new() }
+    }
+
+    /// The box around everything.
+    pub fn bounds(&self) -> Bounds {
+        self.parts.iter().map(Part::bounds).chain(self.boxes.iter().copied()).fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Builds the tree; everything lies within `bounds`.
+    pub fn grow(self, bounds: Bounds, leaves: LeafRule) -> Tree {
+        let frame = self.frame(bounds);
+        let Self { parts, boxes, references } = self;
+        let soup = Soup::new(&frame, &parts);
+        let normalised = |b: &Bounds| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() };
+        let others: Vec<Box3> = boxes.iter().map(normalised).collect();
+        // Each is dropped as soon as it can be: a million instances weigh enough.
+        drop(boxes);
+        let Cheapest { plan, triangles, is_split } = Cheapest::of(&soup, others, leaves);
+        let mut packs = Vec::new();
+        let leaf = |leaf: &[u32]| {
+            if let Some(other) = (leaf[0] as usize).checked_sub(triangles.count(&soup)) {
+                return OTHER | references[other];
+            }
+            let mut leaf: Vec<u32> = leaf.iter().map(|&part| triangles.of(part)).collect();
+            leaf.sort_unstable();
+            leaf.dedup();
+            packs.push(Pack::new(leaf.iter().map(|&triangle| soup.triangle(triangle))));
+            packs.len() as u32 - 1
+        };
+        let collapsed = plan.carry_out(leaf);
+        Tree::new(frame, collapsed, packs, is_split)
+    }
+
+    /// Coordinates in which triangles may stand as they are, if there are any that are not moved, and that is not far away.
+    fn frame(&self, bounds: Bounds) -> Normalisation {
+        let (middle, half) = (max_abs(bounds.min * 0.5 + bounds.max * 0.5), max_abs(bounds.max * 0.5 - bounds.min * 0.5));
+        let is_near = middle <= NEAR * half || (self.parts.len() == 1 && self.boxes.is_empty());
+        let stays = self.parts.iter().any(|part| part.to_world.is_none());
+        if stays && is_near { Normalisation::scaling(bounds) } else { Normalisation::of(bounds) }
+    }
+}
+
+impl Part<'_> {
+    fn bounds(&self) -> Bounds {
+        let Some(to_world) = self.to_world else { return self.triangles.bounds() };
+        let corners = (0..self.triangles.count() as u32).flat_map(|triangle| self.triangles.vertices(triangle));
+        Bounds::of(corners.map(|corner| to_world.transform_point3(corner)))
+    }
+}
+
+/// Triangles of all parts in normalised coordinates, one after the other.
+struct Soup<'a> {
+    vertices: Vec<Vec3>,
+    owners: Vec<Owner<'a>>,
+    count: usize,
+}
+
+/// Where a part begins in the soup.
+struct Owner<'a> {
+    triangles: &'a Triangles,
+    first_triangle: u32,
+    first_vertex: usize,
+    /// Whether its triangles are what they are in its mesh, but for a power of two.
+    is_exact: bool,
+}
+
+impl<'a> Soup<'a> {
+    fn new(frame: &Normalisation, parts: &[Part<'a>]) -> Self {
+        let mut soup = Self { vertices: Vec::new(), owners: Vec::with_capacity(parts.len()), count: 0 };
+        for part in parts {
+            let first_vertex = soup.vertices.len();
+            let mut is_exact = part.to_world.is_none() && frame.keeps_origin();
+            let place = |position: DVec3| part.to_world.map_or(position, |to_world| to_world.transform_point3(position));
+            soup.vertices.extend(part.triangles.positions().map(|position| {
+                let vertex = frame.point(place(position)).as_vec3();
+                // What is beyond 1 belongs to no triangle.
+                is_exact &= vertex.abs().max_element() > 1.0 || frame.unscaled(vertex.as_dvec3()) == position;
+                vertex
+            }));
+            soup.owners.push(Owner { triangles: part.triangles, first_triangle: soup.count as u32, first_vertex, is_exact });
+            soup.count += part.triangles.count();
+        }
+        soup
+    }
+
+    fn owner(&self, triangle: u32) -> (usize, &Owner<'a>) {
+        let part = self.owners.partition_point(|owner| owner.first_triangle <= triangle) - 1;
+        (part, &self.owners[part])
+    }
+
+    fn vertices(&self, triangle: u32) -> [Vec3; 3] {
+        let (_, owner) = self.owner(triangle);
+        owner.triangles.indices(triangle - owner.first_triangle).map(|vertex| self.vertices[owner.first_vertex + vertex])
+    }
+
+    fn triangle(&self, triangle: u32) -> PackTriangle {
+        let (part, owner) = self.owner(triangle);
+        let vertices = self.vertices(triangle);
+        PackTriangle { instance: part as u16, id: triangle - owner.first_triangle, vertices, is_exact: owner.is_exact }
+    }
+}
+
+/// A tree over triangles or, where that is cheaper, over parts of triangles, and over other boxes, which come after these.
+struct Cheapest {
+    plan: Collapse,
+    triangles: Kept,
+    is_split: bool,
+}
+
+/// Which triangle each of the first boxes is of.
+struct Kept {
+    /// None where triangles are whole.
+    parts: Vec<u32>,
+}
+
+impl Kept {
+    fn of(&self, part: u32) -> u32 {
+        self.parts.get(part as usize).copied().unwrap_or(part)
+    }
+
+    fn count(&self, soup: &Soup) -> usize {
+        if self.parts.is_empty() { soup.count } else { self.parts.len() }
+    }
+}
+
+impl Cheapest {
+    fn of(soup: &Soup, others: Vec<Box3>, leaves: LeafRule) -> Self {
+        let mut whole: Vec<Box3> = (0..soup.count as u32).map(|triangle| Box3::of(soup.vertices(triangle))).collect();
+        let parts = if whole.is_empty() { None } else { split(&whole, |triangle| soup.vertices(triangle)) };
+        whole.extend_from_slice(&others);
+        let plain = Draft::over(&whole);
+        if let Some(References { mut boxes, triangles }) = parts {
+            boxes.extend_from_slice(&others);
+            let split = Draft::over(&boxes);
+            if split.cost() < plain.cost() {
+                let plan = Collapse::plan(split.finish(&boxes), leaves, triangles.len() as u32);
+                return Self { plan, triangles: Kept { parts: triangles }, is_split: true };
+            }
+        }
+        drop(others);
+        let plan = Collapse::plan(plain.finish(&whole), leaves, soup.count as u32);
+        Self { plan, triangles: Kept { parts: Vec::new() }, is_split: false }
+    }
+}

@@ -1,0 +1,70 @@
+//! The triangles of a mesh.
+
+use glam::{DVec3, Vec3};
+
+use super::frame::Normalisation;
+use crate::shape::{
+    Bounds, Ray,
+    triangle::{Sheared, TriangleHit},
+};
+
+/// Triangles in the mesh's own coordinates.
+#[derive(Debug)]
+pub struct Triangles {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    bounds: Bounds,
+    frame: Normalisation,
+}
+
+impl Triangles {
+    /// At least one; positions are finite and indices in range.
+    pub fn new(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        let bounds = |positions: &[[f32; 3]]| Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
+        let frame = Normalisation::scaling(bounds(&positions));
+        // What scaling cannot keep, being 2^-126 of the mesh's size, is nothing for all who look at a position.
+        for position in &mut positions {
+            let scaled = frame.point(Vec3::from(*position).as_dvec3()).as_vec3();
+            *position = frame.unscaled(scaled.as_dvec3()).as_vec3().into();
+        }
+        Self { bounds: bounds(&positions), frame, positions, triangles }
+    }
+
+    /// Number of triangles.
+    pub fn count(&self) -> usize {
+        self.triangles.len()
+    }
+
+    /// The box around them.
+    pub fn bounds(&self) -> Bounds {
+        self.bounds
+    }
+
+    /// All that there are to be vertices.
+    pub fn positions(&self) -> impl Iterator<Item = DVec3> {
+        self.positions.iter().map(|&position| Vec3::from(position).as_dvec3())
+    }
+
+    /// Indices of a triangle's vertices.
+    pub fn indices(&self, triangle: u32) -> [usize; 3] {
+        self.triangles[triangle as usize].map(|i| i as usize)
+    }
+
+    /// Vertices of a triangle.
+    #[inline(always)]
+    pub fn vertices(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// Where a ray in the mesh's coordinates hits a triangle, with `t > 0`: the same bits as packs find.
+    pub fn hit(&self, triangle: u32, ray: &Ray) -> Option<TriangleHit> {
+        let sheared = Sheared::new(self.frame.point(ray.origin), ray.direction);
+        let at = sheared.hit(sheared.turned(self.vertices(triangle).map(|vertex| self.frame.point(vertex))))?;
+        Some(TriangleHit { t: self.frame.unscaled(at.t), ..at })
+    }
+
+    /// Memory in bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.positions) + size_of_val(&*self.triangles)
+    }
+}
