@@ -6,10 +6,16 @@
 
 use glam::Vec3;
 
-use super::build::{Below, BinaryNode, Box3};
+use super::{
+    build::{Below, BinaryNode, Box3},
+    parallel,
+};
 
 /// Neighbours on either side that a cluster may join.
 const WINDOW: usize = 16;
+
+/// Clusters that one thread looks at.
+const CHUNK: usize = 1 << 14;
 
 /// A pass in which less than this part of all clusters joins is one of few joins.
 const FEW: usize = 16;
@@ -73,16 +79,28 @@ impl Clusters {
     /// both places. That is one order of all pairs, in which some pair comes first for both of its clusters, and equal boxes prefer their neighbours.
     fn search<const REACH: usize>(&self, best: &mut [u64]) {
         best[..self.count + REACH].fill(u64::MAX);
-        for at in 0..self.count {
-            let areas = self.areas::<REACH>(at);
-            let mut own = best[at];
-            for (area, other) in areas.into_iter().zip(at + 1..) {
+        let search = |first: usize, best: &mut [u64]| {
+            let mut behind = [u64::MAX; REACH];
+            for at in 0..best.len() {
+                let areas = self.areas::<REACH>(first + at);
+                let mut own = best[at];
                 // Areas are not negative: their bits order as they do.
-                let key = u64::from(area.to_bits()) << 32 | (at ^ other) as u64;
-                own = own.min(key);
-                best[other] = best[other].min(key);
+                let key = |apart: usize| u64::from(areas[apart].to_bits()) << 32 | ((first + at) ^ (first + at + 1 + apart)) as u64;
+                let inside = (best.len() - at - 1).min(REACH);
+                for (apart, other) in best[at + 1..][..inside].iter_mut().enumerate() {
+                    (own, *other) = (own.min(key(apart)), key(apart).min(*other));
+                }
+                for (apart, other) in (inside..REACH).zip(&mut behind) {
+                    (own, *other) = (own.min(key(apart)), key(apart).min(*other));
+                }
+                best[at] = own;
             }
-            best[at] = own;
+            behind
+        };
+        let behind = parallel::map_chunks(&mut best[..self.count], CHUNK, search);
+        for (chunk, behind) in behind.iter().enumerate() {
+            let end = ((chunk + 1) * CHUNK).min(self.count);
+            best[end..].iter_mut().zip(behind).for_each(|(best, key)| *best = (*best).min(*key));
         }
     }
 
@@ -146,13 +164,14 @@ impl Clusters {
 fn along_curve(boxes: &[Box3]) -> Vec<u32> {
     let all = Box3::of(boxes.iter().map(Box3::centroid));
     let scale = (all.max - all.min).map(|extent| if extent > 0.0 { LAST_CELL / extent } else { 0.0 });
-    let key = |(at, b): (usize, &Box3)| {
+    let key = |at: usize| {
+        let b = &boxes[at];
         let cell = ((b.centroid() - all.min) * scale).min(Vec3::splat(LAST_CELL));
         let code = spread(cell.x as u64) | spread(cell.y as u64) << 1 | spread(cell.z as u64) << 2;
         (code, b.half_area().to_bits(), at as u32)
     };
-    let mut keys: Vec<(u64, u32, u32)> = boxes.iter().enumerate().map(key).collect();
-    keys.sort_unstable();
+    let mut keys: Vec<(u64, u32, u32)> = parallel::map(boxes.len(), key);
+    parallel::sort(&mut keys);
     keys.into_iter().map(|(_, _, at)| at).collect()
 }
 

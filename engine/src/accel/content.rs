@@ -7,6 +7,7 @@ use super::{
     collapse::{Collapse, LeafRule},
     frame::Normalisation,
     pack::{Pack, PackTriangle},
+    parallel,
     split::{References, split},
     tree::{OTHER, Tree},
     triangles::Triangles,
@@ -55,7 +56,7 @@ impl<'a> Content<'a> {
         // Each is dropped as soon as it can be: a million instances weigh enough.
         drop(boxes);
         let Cheapest { plan, triangles, is_split } = Cheapest::of(&soup, others, leaves);
-        let mut packs = Vec::new();
+        let (mut packed, mut begins) = (Vec::new(), vec![0]);
         let leaf = |leaf: &[u32]| {
             if let Some(other) = (leaf[0] as usize).checked_sub(triangles.count(&soup)) {
                 return OTHER | references[other];
@@ -63,10 +64,13 @@ impl<'a> Content<'a> {
             let mut leaf: Vec<u32> = leaf.iter().map(|&part| triangles.of(part)).collect();
             leaf.sort_unstable();
             leaf.dedup();
-            packs.push(Pack::new(leaf.iter().map(|&triangle| soup.triangle(triangle))));
-            packs.len() as u32 - 1
+            packed.append(&mut leaf);
+            begins.push(packed.len());
+            begins.len() as u32 - 2
         };
         let collapsed = plan.carry_out(leaf);
+        let pack = |at: usize| Pack::new(packed[begins[at]..begins[at + 1]].iter().map(|&triangle| soup.triangle(triangle)));
+        let packs = parallel::map(begins.len() - 1, pack);
         Tree::new(frame, collapsed, packs, is_split)
     }
 
@@ -164,7 +168,7 @@ impl Kept {
 
 impl Cheapest {
     fn of(soup: &Soup, others: Vec<Box3>, leaves: LeafRule) -> Self {
-        let mut whole: Vec<Box3> = (0..soup.count as u32).map(|triangle| Box3::of(soup.vertices(triangle))).collect();
+        let mut whole: Vec<Box3> = parallel::map(soup.count, |triangle| Box3::of(soup.vertices(triangle as u32)));
         let parts = if whole.is_empty() { None } else { split(&whole, |triangle| soup.vertices(triangle)) };
         whole.extend_from_slice(&others);
         let plain = Draft::over(&whole);

@@ -20,6 +20,7 @@ mod node;
 mod pack;
 mod packet;
 mod pages;
+mod parallel;
 mod pencil;
 mod pending;
 mod reinsert;

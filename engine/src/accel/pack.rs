@@ -160,29 +160,13 @@ impl Pack {
         self.rounding == 0.0
     }
 
-    /// Where a ray in scaled coordinates hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
+    /// Where a ray in normalised coordinates hits the triangle in a place. A function of its own, so that the walk through the tree keeps its registers.
     ///
     /// # Safety
     /// The place is below 8.
     #[inline(never)]
-    pub unsafe fn hit_by(&self, slot: usize, origin: DVec3, direction: DVec3) -> Option<TriangleHit> {
-        let sheared = Sheared::new(origin, direction);
-        // SAFETY: by this function's own condition.
-        unsafe { self.hit_in(slot, &sheared) }
-    }
-
-    /// The same for a ray that is ready for it.
-    ///
-    /// # Safety
-    /// The place is below 8.
-    #[inline(never)]
-    pub unsafe fn hit(&self, slot: usize, ray: &Sheared) -> Option<TriangleHit> {
-        // SAFETY: by this function's own condition.
-        unsafe { self.hit_in(slot, ray) }
-    }
-
-    #[inline(always)]
-    unsafe fn hit_in(&self, slot: usize, ray: &Sheared) -> Option<TriangleHit> {
+    pub unsafe fn hit(&self, slot: usize, origin: DVec3, direction: DVec3) -> Option<TriangleHit> {
+        let ray = Sheared::new(origin, direction);
         let [x, y, z] = ray.axes();
         // SAFETY: by this function's own condition; axes are below 3.
         let at = |vertex: &[[f32; 8]; 3], axis: usize| unsafe { f64::from(*vertex.get_unchecked(axis).get_unchecked(slot)) };

@@ -2,7 +2,10 @@
 //!
 //! As published, a search among boxes that overlap looks at most of the tree. Here it ends after some steps, with the best place so far.
 
-use super::build::{Below, BinaryNode, Box3};
+use super::{
+    build::{Below, BinaryNode, Box3},
+    parallel,
+};
 
 /// Share of all nodes for which the first pass looks for a better place; later ones do so for a third of it, a fifth, and so on.
 const SHARE: f32 = 0.15;
@@ -42,8 +45,6 @@ struct Linked {
     parents: Vec<u32>,
     /// Whether a move of this pass has changed a node.
     touched: Vec<bool>,
-    /// Memory of searches: nodes to look at, and what would be gained if they grew by nothing.
-    ahead: Vec<(f32, u32)>,
 }
 
 /// The other one of a pair.
@@ -54,7 +55,7 @@ fn sibling(node: u32) -> u32 {
 impl Linked {
     fn new(nodes: Vec<BinaryNode>) -> Self {
         let count = nodes.len();
-        let mut tree = Self { nodes, parents: vec![0; count], touched: vec![false; count], ahead: Vec::new() };
+        let mut tree = Self { nodes, parents: vec![0; count], touched: vec![false; count] };
         (0..count as u32).for_each(|at| tree.link(at));
         tree
     }
@@ -80,15 +81,16 @@ impl Linked {
             candidates.select_nth_unstable(count);
             candidates.truncate(count);
         }
-        candidates.sort_unstable();
-        let mut moves: Vec<Move> = candidates.iter().filter_map(|&(_, from)| self.search(from)).collect();
+        parallel::sort(&mut candidates);
+        let search = |ahead: &mut Vec<(f32, u32)>, at: usize| self.search(candidates[at].1, ahead);
+        let mut moves: Vec<Move> = parallel::map_with(candidates.len(), Vec::new, search).into_iter().flatten().collect();
         moves.sort_unstable_by(|a, b| b.gain.total_cmp(&a.gain).then(a.from.cmp(&b.from)));
         self.touched.fill(false);
         moves.into_iter().for_each(|chosen| self.try_move(chosen));
     }
 
-    /// The best place for a node, if there is a better one than where it is.
-    fn search(&mut self, from: u32) -> Option<Move> {
+    /// The best place for a node, if there is a better one than where it is. `ahead` is room for nodes to look at, and what would be gained if they grew by nothing.
+    fn search(&self, from: u32, ahead: &mut Vec<(f32, u32)>) -> Option<Move> {
         let bounds = self.bounds(from);
         let area = bounds.half_area();
         let parent = self.parents[from as usize];
@@ -97,10 +99,10 @@ impl Linked {
         // What is gained by taking the node away, as seen from `top`, below which `left` is what remains.
         let (mut gain, mut left) = (self.bounds(parent).half_area(), self.bounds(beside));
         let mut steps = STEPS;
-        self.ahead.clear();
+        ahead.clear();
         loop {
-            self.ahead.push((gain, beside));
-            while let Some((gain, at)) = self.ahead.pop() {
+            ahead.push((gain, beside));
+            while let Some((gain, at)) = ahead.pop() {
                 if gain - area <= best.gain || steps == 0 {
                     continue;
                 }
@@ -112,7 +114,7 @@ impl Linked {
                 }
                 if let Below::Pair(first) = node.below {
                     let below = here + node.bounds.half_area();
-                    self.ahead.extend([(below, first), (below, first + 1)]);
+                    ahead.extend([(below, first), (below, first + 1)]);
                 }
             }
             if top != parent {

@@ -85,7 +85,7 @@ impl<V: Visitor> Stream<'_, V> {
                 let (instance, triangle) = pack.id(slot);
                 let at = if pack.is_exact() {
                     let ray = self.rays.get_unchecked(number);
-                    let at = pack.hit_by(slot, self.frame.point(ray.origin), ray.direction);
+                    let at = pack.hit(slot, self.frame.point(ray.origin), ray.direction);
                     at.map(|at| TriangleHit { t: self.frame.unscaled(at.t), ..at })
                 } else {
                     self.visitor.exact(number, instance, triangle)

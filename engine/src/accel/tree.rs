@@ -16,10 +16,7 @@ use super::{
     traverse::traverse,
     visitor::{MeshHit, Visitor},
 };
-use crate::shape::{
-    Bounds, Ray,
-    triangle::{Sheared, TriangleHit},
-};
+use crate::shape::{Bounds, Ray, triangle::TriangleHit};
 
 /// Marks a leaf's reference as one to something else than a pack of triangles.
 pub const OTHER: u32 = 1 << 30;
@@ -82,7 +79,6 @@ impl Tree {
     pub unsafe fn walk<L: Lanes, const ANY: bool>(&self, ray: &Ray, limit: f64, visitor: &mut impl Visitor) {
         let frame = &self.frame;
         let boxed = frame.ray::<false>(ray.origin, ray.direction);
-        let sheared = Sheared::new(frame.point(ray.origin), ray.direction);
         let filter = PackRay::new(&boxed);
         let whole = boxed.limit(limit);
         let (mut limit, mut boxed_limit) = (limit, whole);
@@ -104,7 +100,7 @@ impl Tree {
                 let (instance, triangle) = unsafe { pack.id(slot) };
                 let at = if pack.is_exact() {
                     // SAFETY: a candidate is one of eight.
-                    unsafe { pack.hit(slot, &sheared) }.map(|at| TriangleHit { t: frame.unscaled(at.t), ..at })
+                    unsafe { pack.hit(slot, frame.point(ray.origin), ray.direction) }.map(|at| TriangleHit { t: frame.unscaled(at.t), ..at })
                 } else {
                     visitor.exact(0, instance, triangle)
                 };

@@ -65,18 +65,6 @@ impl Sheared {
         self.axes
     }
 
-    /// How far the first and the second axis lean along the last.
-    #[inline(always)]
-    pub fn shear(&self) -> [f64; 2] {
-        [self.shear[0], self.shear[1]]
-    }
-
-    /// Whether the direction is negative along the last axis.
-    #[inline(always)]
-    pub fn is_backward(&self) -> bool {
-        self.direction[2] < 0.0
-    }
-
     /// A triangle in the ray's own axes.
     #[inline(always)]
     pub fn turned(&self, [a, b, c]: [DVec3; 3]) -> [[f64; 3]; 3] {

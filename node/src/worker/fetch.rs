@@ -46,8 +46,8 @@ impl Fetcher {
         match self.fetch_all(frame, ids).await {
             Ok((description, assets)) => {
                 let done = self.done;
-                let work = move || Scene::compile(&description, &assets).map(Arc::new).map_err(|error| error.to_string());
-                self.lanes.add(work, move |result| drop(done.send(compiled(result.and_then(|result| result)))));
+                let compile = move || Scene::compile(&description, &assets).map(Arc::new).map_err(|error| error.to_string());
+                self.lanes.add(self.lanes.shared(compile), move |result| drop(done.send(compiled(result.and_then(|result| result)))));
             }
             Err(error) => drop(self.done.send(compiled(Err(error)))),
         }

@@ -8,6 +8,8 @@ use std::{
     thread,
 };
 
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
 use crate::limits::LANE_NICENESS;
 
 type Task = Box<dyn FnOnce() + Send>;
@@ -16,6 +18,8 @@ type Task = Box<dyn FnOnce() + Send>;
 #[derive(Clone)]
 pub struct Lanes {
     queue: Arc<Queue>,
+    /// As many threads, for work that one lane alone would keep the others waiting with.
+    helpers: Arc<ThreadPool>,
 }
 
 #[derive(Default)]
@@ -35,7 +39,16 @@ impl Lanes {
             let queue = queue.clone();
             thread::Builder::new().name(format!("lane {lane}")).spawn(move || queue.work())?;
         }
-        Ok(Self { queue })
+        let lower_priority = |_| _ = rustix::process::nice(LANE_NICENESS);
+        let helpers = ThreadPoolBuilder::new().num_threads(count as usize).thread_name(|at| format!("helper {at}"));
+        let helpers = helpers.start_handler(lower_priority).build().map_err(std::io::Error::other)?;
+        Ok(Self { queue, helpers: Arc::new(helpers) })
+    }
+
+    /// Work for a lane that is shared out, as far as it can be, among as many threads as there are lanes.
+    pub fn shared<T: Send>(&self, work: impl FnOnce() -> T + Send + 'static) -> impl FnOnce() -> T + Send + 'static {
+        let helpers = self.helpers.clone();
+        move || helpers.install(work)
     }
 
     /// Adds work behind what waits, and what is to be done with its result; a panic of the work is an error in words. What bounds the queue

@@ -54,6 +54,27 @@ fn feared_meshes_are_hit_as_without_a_tree() {
     }
 }
 
+/// A mesh so large that threads share the work, with slivers, which are split.
+#[test]
+fn a_tree_is_the_same_however_many_threads_build_it() {
+    let make = |i: u32| {
+        let [a, b, c] = random(i, if i % 8 == 0 { 0.5 } else { 0.01 });
+        [a, b, if i % 8 == 0 { b + (c - b) * 1e-3 } else { c }]
+    };
+    let mesh = MeshData {
+        positions: (0..60_000).flat_map(make).map(|p| p.as_vec3().into()).collect(),
+        triangles: (0..60_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
+        ..Default::default()
+    };
+    let hashes = [1, 2, 3, 8, 64].map(|threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let scene = pool.install(|| Maker::default().mesh(&mesh, DAffine3::IDENTITY).compile());
+        assert!(scene.geometry.tree.as_ref().unwrap().is_split());
+        scene.tree_hash()
+    });
+    assert_eq!(hashes, [hashes[0]; 5]);
+}
+
 /// One, two and eight threads that build at once, each in an order of its own.
 #[test]
 fn trees_are_the_same_on_any_number_of_threads() {
