@@ -46,6 +46,11 @@ impl Camera {
         Ok(Self { eye, corner, right: right * pixel, down: upright * -pixel })
     }
 
+    /// The same camera elsewhere.
+    pub fn moved(self, by: DVec3) -> Self {
+        Self { eye: self.eye + by, ..self }
+    }
+
     /// Where all its rays start.
     pub fn eye(&self) -> DVec3 {
         self.eye

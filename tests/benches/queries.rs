@@ -62,7 +62,7 @@ struct Rays {
 
 fn rays(scene: &Scene) -> Rays {
     let mut rays = Rays::default();
-    let light = DVec3::from(s1::LIGHTS[0].0);
+    let light = DVec3::from(s1::LIGHTS[0].0) - scene.begin();
     let mut state = 1u64;
     let mut unit = || {
         state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -18,12 +18,14 @@ use crate::{math::max_abs, shape::Bounds};
 pub struct Part<'a> {
     /// Its triangles.
     pub triangles: &'a Triangles,
-    /// Where they stand; `None` where they are.
+    /// Where they stand; `None` if all that is done is to put their origin at that of [`Content`].
     pub to_world: Option<DAffine3>,
 }
 
 /// All that a tree is over: at least one triangle or box. All are finite.
 pub struct Content<'a> {
+    /// Where the origin of meshes stands that are neither turned nor scaled nor moved.
+    pub origin: DVec3,
     /// Instances, by their numbers; at most 2^16, of less than 2^29 triangles.
     pub parts: Vec<Part<'a>>,
     /// Boxes of other things.
@@ -38,19 +40,19 @@ const NEAR: f64 = 16.0;
 impl<'a> Content<'a> {
     /// Triangles of one mesh, where they are.
     pub fn of(triangles: &'a Triangles) -> Self {
-        Self { parts: vec![Part { triangles, to_world: None }], boxes: Vec::new(), references: Vec::new() }
+        Self { origin: DVec3::ZERO, parts: vec![Part { triangles, to_world: None }], boxes: Vec::new(), references: Vec::new() }
     }
 
     /// The box around everything.
     pub fn bounds(&self) -> Bounds {
-        self.parts.iter().map(Part::bounds).chain(self.boxes.iter().copied()).fold(Bounds::EMPTY, Bounds::union)
+        self.parts.iter().map(|part| part.bounds(self.origin)).chain(self.boxes.iter().copied()).fold(Bounds::EMPTY, Bounds::union)
     }
 
     /// Builds the tree; everything lies within `bounds`.
     pub fn grow(self, bounds: Bounds, leaves: LeafRule) -> Tree {
         let frame = self.frame(bounds);
-        let Self { parts, boxes, references } = self;
-        let soup = Soup::new(&frame, &parts);
+        let Self { origin, parts, boxes, references } = self;
+        let soup = Soup::new(&frame, origin, &parts);
         let normalised = |b: &Bounds| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() };
         let others: Vec<Box3> = boxes.iter().map(normalised).collect();
         // Each is dropped as soon as it can be: a million instances weigh enough.
@@ -74,18 +76,22 @@ impl<'a> Content<'a> {
         Tree::new(frame, collapsed, packs, is_split)
     }
 
-    /// Coordinates in which triangles may stand as they are, if there are any that are not moved, and that is not far away.
+    /// Coordinates in which triangles may stand as they are, if there are any that are not moved, and if these are not far from their origin.
     fn frame(&self, bounds: Bounds) -> Normalisation {
-        let (middle, half) = (max_abs(bounds.min * 0.5 + bounds.max * 0.5), max_abs(bounds.max * 0.5 - bounds.min * 0.5));
+        let middle = max_abs(bounds.min * 0.5 + bounds.max * 0.5 - self.origin);
+        let half = max_abs(bounds.max * 0.5 - bounds.min * 0.5);
         let is_near = middle <= NEAR * half || (self.parts.len() == 1 && self.boxes.is_empty());
         let stays = self.parts.iter().any(|part| part.to_world.is_none());
-        if stays && is_near { Normalisation::scaling(bounds) } else { Normalisation::of(bounds) }
+        if stays && is_near { Normalisation::scaling(self.origin, bounds) } else { Normalisation::of(bounds) }
     }
 }
 
 impl Part<'_> {
-    fn bounds(&self) -> Bounds {
-        let Some(to_world) = self.to_world else { return self.triangles.bounds() };
+    fn bounds(&self, origin: DVec3) -> Bounds {
+        let Some(to_world) = self.to_world else {
+            let Bounds { min, max } = self.triangles.bounds();
+            return Bounds { min: min + origin, max: max + origin };
+        };
         let corners = (0..self.triangles.count() as u32).flat_map(|triangle| self.triangles.vertices(triangle));
         Bounds::of(corners.map(|corner| to_world.transform_point3(corner)))
     }
@@ -108,14 +114,15 @@ struct Owner<'a> {
 }
 
 impl<'a> Soup<'a> {
-    fn new(frame: &Normalisation, parts: &[Part<'a>]) -> Self {
+    fn new(frame: &Normalisation, origin: DVec3, parts: &[Part<'a>]) -> Self {
         let mut soup = Self { vertices: Vec::new(), owners: Vec::with_capacity(parts.len()), count: 0 };
         for part in parts {
             let first_vertex = soup.vertices.len();
-            let mut is_exact = part.to_world.is_none() && frame.keeps_origin();
-            let place = |position: DVec3| part.to_world.map_or(position, |to_world| to_world.transform_point3(position));
+            let stays = part.to_world.is_none() && frame.keeps(origin);
+            let place = |position: DVec3| part.to_world.map_or(position + origin, |to_world| to_world.transform_point3(position));
+            let mut is_exact = stays;
             soup.vertices.extend(part.triangles.positions().map(|position| {
-                let vertex = frame.point(place(position)).as_vec3();
+                let vertex = if stays { frame.scaled(position) } else { frame.point(place(position)) }.as_vec3();
                 // What is beyond 1 belongs to no triangle.
                 is_exact &= vertex.abs().max_element() > 1.0 || frame.unscaled(vertex.as_dvec3()) == position;
                 vertex

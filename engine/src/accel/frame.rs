@@ -68,14 +68,20 @@ impl Normalisation {
         Self { center, scale, unscale: 1.0 / scale }
     }
 
-    /// For things in a finite box that keep their origin: f32 coordinates stay as exact as they are.
-    pub fn scaling(bounds: Bounds) -> Self {
-        Self::new(DVec3::ZERO, max_abs(bounds.max).max(max_abs(bounds.min)))
+    /// For things in a finite box of which some keep their own origin, which stands at this place: their f32 coordinates stay as exact as they are.
+    pub fn scaling(origin: DVec3, bounds: Bounds) -> Self {
+        Self::new(origin, max_abs(bounds.max - origin).max(max_abs(bounds.min - origin)))
     }
 
-    /// Whether the origin stays where it is.
-    pub fn keeps_origin(&self) -> bool {
-        self.center == DVec3::ZERO
+    /// Whether what has its own origin at this place keeps it.
+    pub fn keeps(&self, origin: DVec3) -> bool {
+        self.center == origin
+    }
+
+    /// A point that is given from the centre, in normalised coordinates.
+    #[inline(always)]
+    pub fn scaled(&self, p: DVec3) -> DVec3 {
+        p * self.scale
     }
 
     /// A point in normalised coordinates.

@@ -100,7 +100,8 @@ impl Tree {
                 let (instance, triangle) = unsafe { pack.id(slot) };
                 let at = if pack.is_exact() {
                     // SAFETY: a candidate is one of eight.
-                    unsafe { pack.hit(slot, frame.point(ray.origin), ray.direction) }.map(|at| TriangleHit { t: frame.unscaled(at.t), ..at })
+                    unsafe { pack.hit(slot, frame.point(ray.origin), ray.direction) }
+                        .map(|at| TriangleHit { t: frame.unscaled(at.t), ..at })
                 } else {
                     visitor.exact(0, instance, triangle)
                 };
@@ -158,7 +159,7 @@ mod tests {
     #[test]
     fn empty_places_are_never_visited() {
         let boxes = [-1.0, 0.0, 3.0].map(|x| Bounds::of([DVec3::splat(x), DVec3::splat(x + 0.5)]));
-        let content = Content { parts: Vec::new(), boxes: boxes.to_vec(), references: vec![100, 101, 102] };
+        let content = Content { origin: DVec3::ZERO, parts: Vec::new(), boxes: boxes.to_vec(), references: vec![100, 101, 102] };
         let tree = content.grow(Bounds::of(boxes.iter().flat_map(|b| b.corners())), LeafRule { most: 8, cost: 1.0 });
         for size in [1.0, 1e20, 1e38, 1e50, 1e53, 1e56, 1e90, 1e200, 1e307, f64::INFINITY, f64::NAN] {
             for axes in [DVec3::X, DVec3::new(0.3, -0.5, 0.9), DVec3::NEG_ONE] {

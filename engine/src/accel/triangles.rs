@@ -21,7 +21,7 @@ impl Triangles {
     /// At least one; positions are finite and indices in range.
     pub fn new(mut positions: Vec<[f32; 3]>, triangles: Vec<[u32; 3]>) -> Self {
         let bounds = |positions: &[[f32; 3]]| Bounds::of(triangles.iter().flatten().map(|&i| Vec3::from(positions[i as usize]).as_dvec3()));
-        let frame = Normalisation::scaling(bounds(&positions));
+        let frame = Normalisation::scaling(DVec3::ZERO, bounds(&positions));
         // What scaling cannot keep, being 2^-126 of the mesh's size, is nothing for all who look at a position.
         for position in &mut positions {
             let scaled = frame.point(Vec3::from(*position).as_dvec3()).as_vec3();

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 pub enum Light {
     /// Shines from a point to all sides.
     Point {
-        /// Position in the world.
+        /// Position.
         position: DVec3,
         /// With fall-off, radiant intensity; without, the irradiance of a surface that faces the light at any distance.
         strength: DVec3,
@@ -52,6 +52,14 @@ impl Light {
             description::Light::Directional { direction, irradiance, .. } => {
                 Self::Directional { towards: -DVec3::from(*direction).normalize(), irradiance: rgb(*irradiance) }
             }
+        }
+    }
+
+    /// The same light elsewhere.
+    pub fn moved(self, by: DVec3) -> Self {
+        match self {
+            Self::Point { position, strength, falloff } => Self::Point { position: position + by, strength, falloff },
+            Self::Directional { .. } => self,
         }
     }
 

@@ -5,6 +5,8 @@ use super::{
     error::CompileError,
     place::{FARTHEST, Placer},
 };
+use glam::DVec3;
+
 use crate::{
     camera::Camera,
     description::{self, AssetSource, Falloff, Frame, Render, SourceId},
@@ -19,23 +21,29 @@ type Result<T> = std::result::Result<T, CompileError>;
 const LARGEST_FILM: u32 = 65_536;
 
 impl Scene {
-    /// Compiles a frame: checks all that it says, reads its assets, builds its trees.
+    /// Compiles a frame: checks all that it says, reads its assets, builds its trees. The scene's coordinates begin at the camera's eye, as coordinates are finest near
+    /// their origin (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., section 5.1.1): a world far from its own looks the same.
     ///
     /// # Errors
     /// Names the object that is wrong, or whose asset is missing or damaged.
     pub fn compile(frame: &Frame, assets: &dyn AssetSource) -> Result<Self> {
-        let whole = SourceId::default();
+        let eye = camera(frame)?.eye();
+        Self::compile_around(frame, assets, eye)
+    }
+
+    /// The same in coordinates that begin at a place of the world.
+    ///
+    /// # Errors
+    /// As [`Self::compile`].
+    pub fn compile_around(frame: &Frame, assets: &dyn AssetSource, begin: DVec3) -> Result<Self> {
         check_film(frame)?;
-        let camera = Camera::compile(&frame.camera, &frame.film).map_err(|message| CompileError::new(whole, message))?;
-        if camera.eye().abs().max_element() > FARTHEST {
-            return Err(CompileError::new(whole, format!("the camera stands farther than {FARTHEST:e} from the middle of the world")));
-        }
-        let lights = frame.scene.lights.iter().map(light).collect::<Result<Vec<_>>>()?;
+        let camera = camera(frame)?.moved(-begin);
+        let lights = frame.scene.lights.iter().map(|description| Ok(light(description)?.moved(-begin))).collect::<Result<Vec<_>>>()?;
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let materials =
             frame.scene.materials.iter().enumerate().map(|(i, m)| material(i, m, textures.len())).collect::<Result<Vec<_>>>()?;
         let transparent = matches!(frame.render, Render::Whitted { transparent_shadows: true, .. });
-        let placed = Placer::new(&frame.scene, assets, materials, textures)
+        let placed = Placer::new(&frame.scene, -begin, assets, materials, textures)
             .place(camera.eye(), &lights, |material| transparent && material.passes_all_light())?;
         Ok(Self {
             camera,
@@ -52,6 +60,15 @@ impl Scene {
             geometry: placed.geometry,
         })
     }
+}
+
+fn camera(frame: &Frame) -> Result<Camera> {
+    let whole = SourceId::default();
+    let camera = Camera::compile(&frame.camera, &frame.film).map_err(|message| CompileError::new(whole, message))?;
+    if camera.eye().abs().max_element() > FARTHEST {
+        return Err(CompileError::new(whole, format!("the camera stands farther than {FARTHEST:e} from the middle of the world")));
+    }
+    Ok(camera)
 }
 
 fn check_film(frame: &Frame) -> Result<()> {

@@ -27,7 +27,7 @@ impl Geometry {
         for (mesh, places) in self.meshes.iter_mut().zip(places) {
             mesh.tree = (places > 0).then(|| Content::of(&mesh.triangles).grow(mesh.triangles.bounds(), leaves));
         }
-        let mut content = Content { parts: Vec::new(), boxes: Vec::new(), references: Vec::new() };
+        let mut content = Content { origin: self.origin, parts: Vec::new(), boxes: Vec::new(), references: Vec::new() };
         let mut add = |kind: u32, first: usize, bounds: &mut dyn Iterator<Item = Bounds>| {
             for (index, bounds) in bounds.enumerate() {
                 content.boxes.push(bounds);
@@ -42,11 +42,10 @@ impl Geometry {
         add(kind::TRANSFORMED, 0, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
         let mesh_of = |instance: &Instance| &self.meshes[instance.mesh as usize];
         add(kind::MESH, grounded, &mut self.instances[grounded..].iter().map(|s| s.shape.transform.bounds_of(mesh_of(&s.shape))));
-        content.parts.extend(
-            self.instances[..grounded]
-                .iter()
-                .map(|s| Part { triangles: &mesh_of(&s.shape).triangles, to_world: s.shape.transform.moved() }),
-        );
+        content.parts.extend(self.instances[..grounded].iter().map(|s| Part {
+            triangles: &mesh_of(&s.shape).triangles,
+            to_world: (!s.shape.transform.only_moves_to(self.origin)).then_some(s.shape.transform.to_world),
+        }));
         let is_empty = content.boxes.is_empty() && content.parts.is_empty();
         let bounds = (!is_empty).then(|| content.bounds());
         self.tree = bounds.map(|bounds| content.grow(bounds, leaves));
@@ -64,7 +63,7 @@ impl Geometry {
     fn ground(&mut self) -> usize {
         let mut places = places_of(&self.instances, self.meshes.len());
         for Placed { shape: Instance { mesh, transform, .. }, .. } in &self.instances {
-            if !is_gentle(transform, self.meshes[*mesh as usize].triangles.bounds()) {
+            if !transform.only_moves_to(self.origin) && !is_gentle(transform, self.meshes[*mesh as usize].triangles.bounds()) {
                 places[*mesh as usize] = 0;
             }
         }
@@ -95,10 +94,9 @@ fn places_of(instances: &[Placed<Instance>], meshes: usize) -> Vec<usize> {
 
 /// Whether what a ray meets in the mesh's coordinates it meets in the world's, as near as boxes in f32 can tell.
 fn is_gentle(transform: &Transform, bounds: Bounds) -> bool {
-    let Some(to_world) = transform.moved() else { return true };
     let [to_mesh, back] = transform.growths();
     let placed = transform.bounds(bounds);
     let size = max_abs(placed.max - placed.min);
-    let farthest = max_abs(placed.max).max(max_abs(placed.min)).max(max_abs(to_world.translation));
+    let farthest = max_abs(placed.max).max(max_abs(placed.min)).max(max_abs(transform.to_world.translation));
     back * to_mesh <= GENTLE && farthest.max(back * max_abs(transform.to_object.translation)) <= NEAR * size
 }

@@ -26,7 +26,8 @@ pub struct Transform {
     /// Largest factor by which a vector's largest component grows on the way to the world, and back.
     growth_to_world: f64,
     growth_to_object: f64,
-    is_identity: bool,
+    /// Whether it only moves.
+    moves: bool,
 }
 
 /// A finite shape under a map that does not leave it the same kind of shape.
@@ -83,6 +84,8 @@ pub mod kind {
 /// All shapes of a scene.
 #[derive(Debug)]
 pub struct Geometry {
+    /// Where the world's origin is.
+    pub origin: DVec3,
     pub planes: Vec<Placed<Plane>>,
     pub spheres: Vec<Placed<Sphere>>,
     pub cuboids: Vec<Placed<Cuboid>>,
@@ -136,12 +139,12 @@ impl Transform {
         let growth = |m: DMat3| max_abs(m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs());
         let (growth_to_world, growth_to_object) = (growth(to_world.matrix3), growth(to_object.matrix3));
         let usable = to_world.is_finite() && to_object.is_finite() && growth_to_world > 0.0 && growth_to_object > 0.0;
-        usable.then_some(Self { to_world, to_object, is_identity: to_world == DAffine3::IDENTITY, growth_to_world, growth_to_object })
+        usable.then_some(Self { to_world, to_object, moves: to_world.matrix3 == DMat3::IDENTITY, growth_to_world, growth_to_object })
     }
 
-    /// Where it takes things that do not stay where they are.
-    pub fn moved(&self) -> Option<DAffine3> {
-        (!self.is_identity).then_some(self.to_world)
+    /// Whether all that it does is to move the origin to a place.
+    pub fn only_moves_to(&self, origin: DVec3) -> bool {
+        self.moves && self.to_world.translation == origin
     }
 
     /// Largest factors by which a vector's largest component grows on the way to the object, and back.
@@ -152,7 +155,12 @@ impl Transform {
     /// A ray in the object's coordinates, where there are no listed spheres; `t` keeps its meaning.
     #[inline(always)]
     pub fn of_ray(&self, ray: &Ray) -> Ray {
-        if self.is_identity { Ray { leaves: 0, ..*ray } } else { ray.transformed(&self.to_object) }
+        if self.moves {
+            // The same bits.
+            Ray { origin: ray.origin + self.to_object.translation, leaves: 0, ..*ray }
+        } else {
+            ray.transformed(&self.to_object)
+        }
     }
 
     /// The box around the image of a box.

@@ -34,7 +34,7 @@ use crate::{
 };
 use geometry::Geometry;
 
-/// A compiled frame.
+/// A compiled frame, in coordinates that begin at [`Scene::begin`].
 #[derive(Debug)]
 pub struct Scene {
     /// From where it is seen.
@@ -63,8 +63,13 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Lowest and highest coordinates of all finite things.
+    /// Where in the world the scene's coordinates begin.
+    pub fn begin(&self) -> DVec3 {
+        -self.geometry.origin
+    }
+
+    /// Lowest and highest coordinates, in the world, of all finite things.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        self.geometry.bounds.map(|Bounds { min, max }| (min, max))
+        self.geometry.bounds.map(|Bounds { min, max }| (min + self.begin(), max + self.begin()))
     }
 }

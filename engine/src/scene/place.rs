@@ -56,9 +56,16 @@ pub struct Placer<'a> {
 }
 
 impl<'a> Placer<'a> {
-    /// Begins with the description's own materials and textures.
-    pub fn new(scene: &'a description::Scene, assets: &'a dyn AssetSource, materials: Vec<Material>, textures: Vec<Texture>) -> Self {
+    /// Begins with the description's own materials and textures; `origin` is where the world's is.
+    pub fn new(
+        scene: &'a description::Scene,
+        origin: DVec3,
+        assets: &'a dyn AssetSource,
+        materials: Vec<Material>,
+        textures: Vec<Texture>,
+    ) -> Self {
         let geometry = Geometry {
+            origin,
             planes: Vec::new(),
             spheres: Vec::new(),
             cuboids: Vec::new(),
@@ -93,7 +100,7 @@ impl<'a> Placer<'a> {
         if self.scene.root as usize >= self.scene.groups.len() {
             return Err(CompileError::new(SourceId::default(), "the scene has no root group"));
         }
-        self.group(self.scene.root, DAffine3::IDENTITY, 0)?;
+        self.group(self.scene.root, DAffine3::from_translation(self.geometry.origin), 0)?;
         self.geometry.finish(eye, lights, |material| casts_no_shadow(&self.materials[material as usize]));
         Ok(self)
     }
@@ -159,11 +166,7 @@ impl<'a> Placer<'a> {
                 check_reach(transform.reach(Bounds::of([point])), source)?;
                 let plane = Plane::new(point, unit(normal, "the plane's normal", source)?);
                 let object = self.next_object(source)?;
-                let shape = if transform.to_world == DAffine3::IDENTITY {
-                    plane
-                } else {
-                    plane.transformed(&transform.to_world, &transform.to_object)
-                };
+                let shape = plane.transformed(&transform.to_world, &transform.to_object);
                 self.geometry.planes.push(Placed { shape, object, material });
                 Ok(())
             }

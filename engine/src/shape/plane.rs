@@ -1,6 +1,6 @@
 //! Infinite planes.
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use super::{Point, Ray};
 use crate::math::{UNIT, max_abs, orthonormal_basis};
@@ -35,7 +35,9 @@ impl Plane {
     pub fn transformed(&self, to_world: &DAffine3, to_object: &DAffine3) -> Self {
         let covector = to_object.matrix3.transpose();
         let moved = DVec2::new(self.u_axis.dot(to_object.translation), self.v_axis.dot(to_object.translation));
-        let (point, normal) = (to_world.transform_point3(self.point), (covector * self.normal).normalize());
+        let is_moved_only = to_world.matrix3 == DMat3::IDENTITY;
+        let normal = if is_moved_only { self.normal } else { (covector * self.normal).normalize() };
+        let point = to_world.transform_point3(self.point);
         Self {
             point,
             normal,

@@ -41,7 +41,8 @@ pub fn compile(name: &str, scene: Scene, job: &JobNode, assets: &MemoryAssets, s
             Fault::new(format!("{name}: job: nothing in the scene has a size that a camera could frame")).with_help("give `camera`")
         })?;
         frame.camera = frame_all(Bounds { min, max }, f64::from(film.width) / f64::from(film.height));
-        compiled.camera = camera::Camera::compile(&frame.camera, film).map_err(|what| Fault::new(format!("{name}: job: {what}")))?;
+        let camera = camera::Camera::compile(&frame.camera, film).map_err(|what| Fault::new(format!("{name}: job: {what}")))?;
+        compiled.camera = camera.moved(-compiled.begin());
     }
     let warnings = compiled.warnings.iter().map(|warning| format!("{}: {}", place(warning.source), warning.message)).collect();
     Ok(Compiled { frame, scene: compiled, warnings })

@@ -56,7 +56,7 @@ const CASES: &[Case] = &[
     case(7, "shells r and r (1 + 4e-5) are not told apart", 1_000_000, spawned::shells),
     case(8, "of coincident surfaces another one wins than the first", 200_000, trees::coincident),
     Case { allowed: 1e-6, ..case(9, "grazing rays, cosines down to 1e-7, do not do as in exact arithmetic", 2_000_000, exact::grazing) },
-    case(10, "spheres up to 1e12 radii away: hits off by 4 u distance / radius, or lost", 2_000_000, exact::far_spheres),
+    case(10, "spheres up to 1e12 radii away: points off by 4 u distance / radius, or lost", 2_000_000, exact::far_spheres),
     case(11, "roots of cones near the apex are others than those of the quadratic", 1_000_000, exact::apexes),
     case(12, "pixels differ where all lengths are scaled by 2^k, |k| <= 60", 0, gallery::scaled),
     case(13, "pixels differ where lights are scaled by 2^k, |k| <= 100", 0, gallery::lit),

@@ -44,7 +44,7 @@ pub fn far_camera(rays: u64) -> Tally {
                 let (x, y) = (i + random.unit(), j + random.unit());
                 let [a, b] = [x, y].map(|x| (2.0 * x / SIDE as f64 - 1.0) * half);
                 perspective += shade(&scene.camera.ray(x, y));
-                parallel += shade(&Ray::new(backward * 20.0 + right * a - up * b, -backward));
+                parallel += shade(&Ray::new(backward * 20.0 + right * a - up * b - scene.begin(), -backward));
                 tally.rays += 1;
             }
             let Ok(mut sums) = sums.lock() else { return };
@@ -154,7 +154,7 @@ impl Nest {
             frame.scene.groups.push(Group { objects: vec![instance] });
         }
         frame.scene.root = self.maps.len() as u32;
-        Scene::compile(&frame, &MemoryAssets::default()).expect("a scene that can be compiled")
+        Scene::compile_around(&frame, &MemoryAssets::default(), DVec3::ZERO).expect("a scene that can be compiled")
     }
 
     fn place(&self, p: DVec3) -> DVec3 {

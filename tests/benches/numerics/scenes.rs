@@ -50,7 +50,7 @@ impl World {
 
     /// The scene, which is one that can be compiled.
     pub fn compile(&self) -> Scene {
-        Scene::compile(&frame(self.objects.clone()), &self.assets).expect("a scene that can be compiled")
+        Scene::compile_around(&frame(self.objects.clone()), &self.assets, DVec3::ZERO).expect("a scene that can be compiled")
     }
 }
 

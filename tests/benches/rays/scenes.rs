@@ -75,7 +75,7 @@ impl Model {
         let mut frame: Frame = s1::frame(64, 64);
         frame.scene.groups = vec![Group { objects }];
         frame.scene.root = 0;
-        Scene::compile(&frame, &assets).expect("the model compiles")
+        Scene::compile_around(&frame, &assets, DVec3::ZERO).expect("the model compiles")
     }
 
     fn ply(&self) -> Vec<u8> {

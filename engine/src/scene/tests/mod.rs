@@ -79,7 +79,7 @@ pub fn frame(objects: Vec<Object>) -> Frame {
 }
 
 pub fn compile(objects: Vec<Object>) -> Scene {
-    Scene::compile(&frame(objects), &MemoryAssets::default()).unwrap()
+    Scene::compile_around(&frame(objects), &MemoryAssets::default(), DVec3::ZERO).unwrap()
 }
 
 /// The 32 spheres over a floor that the speed of small scenes is measured on.
@@ -148,7 +148,7 @@ impl Maker {
     }
 
     pub fn compile(&self) -> Scene {
-        Scene::compile(&frame(self.objects.clone()), &self.assets).unwrap()
+        Scene::compile_around(&frame(self.objects.clone()), &self.assets, DVec3::ZERO).unwrap()
     }
 }
 

@@ -55,7 +55,7 @@ fn the_short_ways_find_what_the_general_ways_find() {
         let mut frame = frame(spheres_on_a_floor());
         frame.scene.lights = lights();
         frame.render = Render::Whitted { max_depth: 8, transparent_shadows, min_weight: 0.0 };
-        let mut scene = Scene::compile(&frame, &MemoryAssets::default()).unwrap();
+        let mut scene = Scene::compile_around(&frame, &MemoryAssets::default(), DVec3::ZERO).unwrap();
         let mut random = Random(11);
         // Also far out on the floor, where segments are too long to be filtered.
         let targets =

@@ -44,7 +44,7 @@ fn a_scene_scaled_by_a_power_of_two_is_hit_at_the_same_bits() {
         let mut assets = MemoryAssets::default();
         let mesh = assets.insert(postcard::to_stdvec(&mesh).unwrap());
         let objects = original.objects.iter().map(|object| scale_object(object, mesh, scale)).collect();
-        let large = Scene::compile(&frame(objects), &assets).unwrap();
+        let large = Scene::compile_around(&frame(objects), &assets, DVec3::ZERO).unwrap();
         for ray in &rays {
             let other = Ray { origin: ray.origin * scale, ..*ray };
             assert_eq!(scaled(large.closest(&other), 1.0), scaled(scene.closest(ray), scale), "2^{exponent} {ray:?}");
@@ -88,7 +88,7 @@ fn nested_groups_are_the_product_of_their_transforms() {
         Group { objects: vec![instance(1, outer)] },
     ];
     nested.scene.root = 2;
-    let nested = Scene::compile(&nested, &MemoryAssets::default()).unwrap();
+    let nested = Scene::compile_around(&nested, &MemoryAssets::default(), DVec3::ZERO).unwrap();
     let direct = Maker::default().add(unit, outer * inner).compile();
     for ray in rays_of(&direct, 5_000) {
         assert_eq!(nested.closest(&ray), direct.closest(&ray));
@@ -117,7 +117,7 @@ fn texture_coordinates_follow_their_conventions() {
         frame(vec![shape(Shape::Plane { point: [5.0, 0.0, 1.0], normal: [0.0, 2.0, 0.0] }, 0), sphere(DVec3::new(0.0, 2.0, 0.0), 1.0, 0)]);
     frame.scene.textures = vec![crate::description::Texture::Checker { even: [0.0; 3], odd: [1.0; 3], size: 1.0 }];
     frame.scene.materials[0] = Material::Diffuse { reflectance: [1.0; 3], texture: Some(0) };
-    let scene = Scene::compile(&frame, &MemoryAssets::default()).unwrap();
+    let scene = Scene::compile_around(&frame, &MemoryAssets::default(), DVec3::ZERO).unwrap();
     let mut random = Random(3);
     for _ in 0..1_000 {
         let origin = DVec3::new(random.signed() * 9.0, 1.0 + random.unit(), 30.0 + random.signed() * 9.0);
