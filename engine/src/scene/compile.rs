@@ -1,7 +1,7 @@
 //! From a description and its assets to a scene.
 
 use super::{
-    Scene, Statistics,
+    Scene, Statistics, Unbuilt,
     error::CompileError,
     place::{FARTHEST, Placer},
 };
@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use crate::{
     camera::Camera,
-    description::{self, AssetSource, Falloff, Frame, Render, SourceId},
+    description::{self, AssetSource, Falloff, Frame, SourceId},
     light::Light,
     material::Material,
     texture::Texture,
@@ -27,25 +27,35 @@ impl Scene {
     /// # Errors
     /// Names the object that is wrong, or whose asset is missing or damaged.
     pub fn compile(frame: &Frame, assets: &dyn AssetSource) -> Result<Self> {
-        let eye = camera(frame)?.eye();
-        Self::compile_around(frame, assets, eye)
+        Ok(Self::read(frame, assets)?.build())
     }
 
-    /// The same in coordinates that begin at a place of the world.
+    /// All of that, but for the trees.
+    ///
+    /// # Errors
+    /// As [`Self::compile`].
+    pub fn read(frame: &Frame, assets: &dyn AssetSource) -> Result<Unbuilt> {
+        let eye = camera(frame)?.eye();
+        Self::read_around(frame, assets, eye)
+    }
+
+    /// [`Self::compile`] in coordinates that begin at a place of the world.
     ///
     /// # Errors
     /// As [`Self::compile`].
     pub fn compile_around(frame: &Frame, assets: &dyn AssetSource, begin: DVec3) -> Result<Self> {
+        Ok(Self::read_around(frame, assets, begin)?.build())
+    }
+
+    fn read_around(frame: &Frame, assets: &dyn AssetSource, begin: DVec3) -> Result<Unbuilt> {
         check_film(frame)?;
         let camera = camera(frame)?.moved(-begin);
         let lights = frame.scene.lights.iter().map(|description| Ok(light(description)?.moved(-begin))).collect::<Result<Vec<_>>>()?;
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let materials =
             frame.scene.materials.iter().enumerate().map(|(i, m)| material(i, m, textures.len())).collect::<Result<Vec<_>>>()?;
-        let transparent = matches!(frame.render, Render::Whitted { transparent_shadows: true, .. });
-        let placed = Placer::new(&frame.scene, -begin, assets, materials, textures)
-            .place(camera.eye(), &lights, |material| transparent && material.passes_all_light())?;
-        Ok(Self {
+        let placed = Placer::new(&frame.scene, -begin, assets, materials, textures).place()?;
+        Ok(Unbuilt(Self {
             camera,
             lights,
             background: frame.scene.background,
@@ -53,12 +63,12 @@ impl Scene {
             render: frame.render.clone(),
             quality: frame.quality.clone(),
             seed: frame.seed,
-            statistics: Statistics::of(&placed.geometry),
+            statistics: Statistics::default(),
             materials: placed.materials,
             textures: placed.textures,
             warnings: placed.warnings,
             geometry: placed.geometry,
-        })
+        }))
     }
 }
 

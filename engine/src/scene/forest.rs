@@ -13,6 +13,9 @@ const MOST_PARTS: usize = 1 << 16;
 /// Most triangles of these.
 const MOST_TRIANGLES: usize = 1 << 29;
 
+/// Most triangles of other instances whose corners are looked at one by one.
+const MOST_MEASURED: usize = 1 << 22;
+
 /// Rounding of rays on their way into a mesh's coordinates counts for nothing beside that of boxes, if coordinates are not larger than this, in proportion to the mesh...
 const NEAR: f64 = 65_536.0;
 
@@ -20,13 +23,19 @@ const NEAR: f64 = 65_536.0;
 const GENTLE: f64 = 4.0;
 
 impl Geometry {
-    /// Builds all trees. The tree of the world holds all finite shapes, but for a few listed spheres; instances whose triangles stand in it come first.
+    /// Builds all trees. The tree of the world holds all finite shapes, but for a few listed spheres.
     pub fn plant(&mut self, leaves: LeafRule) {
-        let grounded = self.ground();
-        let places = places_of(&self.instances[grounded..], self.meshes.len());
+        let places = places_of(&self.instances[self.grounded..], self.meshes.len());
         for (mesh, places) in self.meshes.iter_mut().zip(places) {
             mesh.tree = (places > 0).then(|| Content::of(&mesh.triangles).grow(mesh.triangles.bounds(), leaves));
         }
+        let content = self.content(self.grounded);
+        let is_empty = content.boxes.is_empty() && content.parts.is_empty();
+        self.tree = (!is_empty).then(|| content.bounds()).map(|bounds| content.grow(bounds, leaves));
+    }
+
+    /// Everything: so many instances triangle by triangle, of the others the boxes.
+    fn content(&self, grounded: usize) -> Content<'_> {
         let mut content = Content { origin: self.origin, parts: Vec::new(), boxes: Vec::new(), references: Vec::new() };
         let mut add = |kind: u32, first: usize, bounds: &mut dyn Iterator<Item = Bounds>| {
             for (index, bounds) in bounds.enumerate() {
@@ -41,16 +50,14 @@ impl Geometry {
         add(kind::OTHER, 0, &mut self.others.iter().map(|s| s.shape.bounds()));
         add(kind::TRANSFORMED, 0, &mut self.transformed.iter().map(|s| s.shape.transform.bounds(s.shape.shape.bounds())));
         let mesh_of = |instance: &Instance| &self.meshes[instance.mesh as usize];
-        add(kind::MESH, grounded, &mut self.instances[grounded..].iter().map(|s| s.shape.transform.bounds_of(mesh_of(&s.shape))));
-        content.parts.extend(self.instances[..grounded].iter().map(|s| Part {
+        let (grounded, others) = self.instances.split_at(grounded);
+        add(kind::MESH, grounded.len(), &mut others.iter().map(|s| s.shape.transform.bounds_of(mesh_of(&s.shape))));
+        let part = |s: &Placed<Instance>| Part {
             triangles: &mesh_of(&s.shape).triangles,
             to_world: (!s.shape.transform.only_moves_to(self.origin)).then_some(s.shape.transform.to_world),
-        }));
-        let is_empty = content.boxes.is_empty() && content.parts.is_empty();
-        let bounds = (!is_empty).then(|| content.bounds());
-        self.tree = bounds.map(|bounds| content.grow(bounds, leaves));
-        let listed = self.list.iter().flat_map(|_| self.spheres.iter().map(|s| s.shape.bounds()));
-        self.bounds = bounds.into_iter().chain(listed).reduce(Bounds::union);
+        };
+        content.parts = grounded.iter().map(part).collect();
+        content
     }
 
     /// All trees.
@@ -58,9 +65,12 @@ impl Geometry {
         self.tree.iter().chain(self.meshes.iter().filter_map(|mesh| mesh.tree.as_ref()))
     }
 
-    /// Sorts instances: first those whose triangles shall stand in the tree of the world, so that rays neither meet boxes around them nor are moved to them. Returns how many.
+    /// Sorts instances: first those whose triangles shall stand in the tree of the world, so that rays neither meet boxes around them nor are moved to them.
     /// All meshes stand in it that are there once, and those that are there so few times that there are at most twice as many triangles.
-    fn ground(&mut self) -> usize {
+    ///
+    /// Also finds the box around everything.
+    pub fn ground(&mut self) {
+        self.instances.shrink_to_fit();
         let mut places = places_of(&self.instances, self.meshes.len());
         for Placed { shape: Instance { mesh, transform, .. }, .. } in &self.instances {
             if !transform.only_moves_to(self.origin) && !is_gentle(transform, self.meshes[*mesh as usize].triangles.bounds()) {
@@ -81,7 +91,12 @@ impl Geometry {
         }
         let is_grounded = |placed: &Placed<Instance>| grounded[placed.shape.mesh as usize];
         self.instances.sort_unstable_by_key(|placed| (!is_grounded(placed), placed.object));
-        self.instances.partition_point(is_grounded)
+        self.grounded = self.instances.partition_point(is_grounded);
+        // Nobody needs it to be tight where that would take long.
+        let instanced: usize = self.instances[self.grounded..].iter().map(|placed| count(placed.shape.mesh as usize)).sum();
+        let content = self.content(if instanced <= MOST_MEASURED { self.instances.len() } else { self.grounded });
+        let is_empty = content.boxes.is_empty() && content.parts.is_empty();
+        self.bounds = (!is_empty).then(|| content.bounds());
     }
 }
 

@@ -93,6 +93,8 @@ pub struct Geometry {
     pub others: Vec<Placed<Other>>,
     pub transformed: Vec<Placed<Transformed>>,
     pub instances: Vec<Placed<Instance>>,
+    /// How many of these, the first, stand in the tree of the world triangle by triangle.
+    pub grounded: usize,
     pub meshes: Vec<Mesh>,
     /// All spheres, where they are few: they stand outside the tree then.
     pub list: Option<SphereList>,
@@ -108,7 +110,6 @@ pub struct Geometry {
 impl Geometry {
     /// Builds all trees, and prepares spheres, where they are few, for rays from the eye and towards lights. `is_clear` tells materials that cast no shadow.
     pub fn finish(&mut self, eye: DVec3, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
-        self.instances.shrink_to_fit();
         self.spheres.sort_by_key(|sphere| is_clear(sphere.material));
         let spheres: Vec<Sphere> = self.spheres.iter().map(|s| s.shape).collect();
         let few = !spheres.is_empty() && spheres.len() <= MOST_LISTED_SPHERES;

@@ -12,6 +12,7 @@ mod statistics;
 mod stream;
 mod surface;
 mod tracer;
+mod unbuilt;
 mod visit;
 #[cfg(test)]
 mod tests;
@@ -21,6 +22,7 @@ pub use query::Hit;
 pub use statistics::Statistics;
 pub use surface::{Crossing, Surface};
 pub use tracer::{Tracer, Work};
+pub use unbuilt::Unbuilt;
 
 use glam::DVec3;
 

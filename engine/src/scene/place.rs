@@ -12,7 +12,6 @@ use crate::{
     accel::{Simd, Triangles},
     assets,
     description::{self, AssetId, AssetSource, GroupId, MaterialId, Matrix, MeshData, Model, Object, ObjectKind, Shape, SourceId},
-    light::Light,
     material::Material,
     math::max_abs,
     shape::{Bounds, Cone, Cuboid, Disc, Other, Plane, Rectangle, Sphere},
@@ -73,6 +72,7 @@ impl<'a> Placer<'a> {
             others: Vec::new(),
             transformed: Vec::new(),
             instances: Vec::new(),
+            grounded: 0,
             meshes: Vec::new(),
             list: None,
             from_eye: None,
@@ -95,13 +95,13 @@ impl<'a> Placer<'a> {
         }
     }
 
-    /// Places the world and builds its tree; `casts_no_shadow` tells materials that let all light through.
-    pub fn place(mut self, eye: DVec3, lights: &[Light], casts_no_shadow: impl Fn(&Material) -> bool) -> Result<Self> {
+    /// Places the world.
+    pub fn place(mut self) -> Result<Self> {
         if self.scene.root as usize >= self.scene.groups.len() {
             return Err(CompileError::new(SourceId::default(), "the scene has no root group"));
         }
         self.group(self.scene.root, DAffine3::from_translation(self.geometry.origin), 0)?;
-        self.geometry.finish(eye, lights, |material| casts_no_shadow(&self.materials[material as usize]));
+        self.geometry.ground();
         Ok(self)
     }
 

@@ -25,7 +25,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let (job, scene) = args.script.load()?;
     let parts = try_policies(&job.description)?;
-    let summary = Summary::of(&job, &scene.statistics, parts)?;
+    let summary = Summary::of(&job, &scene.build().statistics, parts)?;
     if args.json {
         let text = serde_json::to_string_pretty(&summary);
         println!("{}", text.map_err(|error| Error::new(ExitCode::Internal, format!("the summary cannot be coded: {error}")))?);

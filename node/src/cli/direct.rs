@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tessera_engine::{part::Rect, scene::Scene};
+use tessera_engine::{part::Rect, scene::Unbuilt};
 
 use super::here;
 use crate::{
@@ -17,9 +17,11 @@ use crate::{
 ///
 /// # Errors
 /// When the job's own split fails, or the folder refuses the files.
-pub fn render(description: &JobDescription, scene: &Scene, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
+    let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| scene.build());
     let parts = parts(description, threads)?;
-    let film = here::parts(scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
+    let film = here::parts(&scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
     let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;
     write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
     Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())

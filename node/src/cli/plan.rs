@@ -46,7 +46,7 @@ pub fn run(args: Args) -> Result<()> {
     let (loaded, scene) = args.script.load()?;
     let job = &loaded.description;
     let start = Instant::now();
-    let costs = costs(job, &scene)?;
+    let costs = costs(job, &scene.build())?;
     let probe_seconds = start.elapsed().as_secs_f64();
     let nodes = farm(&args, &job.probe);
     let mut policies = job.script.as_ref().map(|script| Policies::new(script, &job.parameters)).transpose()?;

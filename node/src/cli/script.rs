@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, path::PathBuf};
 
-use tessera_engine::scene::Scene;
+use tessera_engine::scene::Unbuilt;
 
 use crate::{
     error::Result,
@@ -32,7 +32,7 @@ impl Script {
     ///
     /// # Errors
     /// [`crate::error::ExitCode::Script`], with the place in the script.
-    pub fn load(&self) -> Result<(LoadedJob, Scene)> {
+    pub fn load(&self) -> Result<(LoadedJob, Unbuilt)> {
         job::load(&self.path, &self.parameters())
     }
 
@@ -40,7 +40,7 @@ impl Script {
     ///
     /// # Errors
     /// As [`Self::load`].
-    pub fn load_frame(&self, frame: u32) -> Result<(LoadedJob, Scene)> {
+    pub fn load_frame(&self, frame: u32) -> Result<(LoadedJob, Unbuilt)> {
         let mut parameters = self.parameters();
         parameters.insert(FRAME_PARAMETER.to_owned(), frame.to_string());
         job::load(&self.path, &parameters)

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use tessera_engine::scene::Scene;
+use tessera_engine::scene::Unbuilt;
 
 use super::{
     client::Client,
@@ -132,13 +132,12 @@ impl Submitted {
 ///
 /// # Errors
 /// The first that there is.
-pub fn each_frame(script: &Script, first: (LoadedJob, Scene), mut render: impl FnMut(&LoadedJob, &Scene) -> Result<()>) -> Result<()> {
+pub fn each_frame(script: &Script, first: (LoadedJob, Unbuilt), mut render: impl FnMut(&LoadedJob, Unbuilt) -> Result<()>) -> Result<()> {
     let sequence = first.0.sequence(&script.parameters());
-    render(&first.0, &first.1)?;
-    drop(first);
+    render(&first.0, first.1)?;
     for frame in sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1) {
         let (loaded, scene) = script.load_frame(frame)?;
-        render(&loaded, &scene)?;
+        render(&loaded, scene)?;
     }
     Ok(())
 }

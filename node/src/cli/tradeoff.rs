@@ -38,7 +38,8 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: Args) -> Result<()> {
-    let (loaded, mut scene) = args.script.load()?;
+    let (loaded, scene) = args.script.load()?;
+    let mut scene = scene.build();
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::new(ExitCode::File, format!("{}: cannot be made: {error}", args.output.display())))?;
     let (name, exposure) = (loaded.description.name, loaded.description.output.exposure);

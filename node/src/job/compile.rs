@@ -1,18 +1,18 @@
-//! A job's scene is compiled once where it is submitted: what is wrong with a file shows at once, at the line that names it.
+//! A job's scene is read once where it is submitted: what is wrong with a file shows at once, at the line that names it.
 
 use tessera_engine::{
-    camera::{self, frame_all},
+    camera::frame_all,
     description::{Camera, Frame, MemoryAssets, Scene, SourceId, Sources},
-    scene,
+    scene::{self, Unbuilt},
     shape::Bounds,
 };
 
 use super::{fault::Fault, handle::JobNode};
 
-/// A frame, its compiled scene, and what is to be said about it.
+/// A frame, its scene, and what is to be said about it.
 pub struct Compiled {
     pub frame: Frame,
-    pub scene: scene::Scene,
+    pub scene: Unbuilt,
     pub warnings: Vec<String>,
 }
 
@@ -34,16 +34,19 @@ pub fn compile(name: &str, scene: Scene, job: &JobNode, assets: &MemoryAssets, s
         quality: quality.clone(),
         seed: *seed,
     };
-    let mut compiled = scene::Scene::compile(&frame, assets)
-        .map_err(|error| Fault { message: format!("{}: {}", place(error.source), error.message), help: error.help })?;
+    let read = |frame: &Frame| {
+        scene::Scene::read(frame, assets)
+            .map_err(|error| Fault { message: format!("{}: {}", place(error.source), error.message), help: error.help })
+    };
+    let mut scene = read(&frame)?;
     if camera.is_none() {
-        let (min, max) = compiled.bounds().ok_or_else(|| {
+        let (min, max) = scene.bounds().ok_or_else(|| {
             Fault::new(format!("{name}: job: nothing in the scene has a size that a camera could frame")).with_help("give `camera`")
         })?;
         frame.camera = frame_all(Bounds { min, max }, f64::from(film.width) / f64::from(film.height));
-        let camera = camera::Camera::compile(&frame.camera, film).map_err(|what| Fault::new(format!("{name}: job: {what}")))?;
-        compiled.camera = camera.moved(-compiled.begin());
+        // Its coordinates begin at the camera.
+        scene = read(&frame)?;
     }
-    let warnings = compiled.warnings.iter().map(|warning| format!("{}: {}", place(warning.source), warning.message)).collect();
-    Ok(Compiled { frame, scene: compiled, warnings })
+    let warnings = scene.warnings().iter().map(|warning| format!("{}: {}", place(warning.source), warning.message)).collect();
+    Ok(Compiled { frame, scene, warnings })
 }

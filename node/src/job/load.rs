@@ -7,7 +7,7 @@ use std::{
 
 use tessera_engine::{
     description::{AssetId, AssetSource, MemoryAssets, Sources},
-    scene::Scene,
+    scene::Unbuilt,
 };
 
 use super::{
@@ -49,12 +49,12 @@ impl LoadedJob {
 ///
 /// # Errors
 /// Exit code 3 and `file:line: object: what is wrong`, for anything that is wrong with the script or a file that it names.
-pub fn load(path: &Path, parameters: &BTreeMap<String, String>) -> Result<(LoadedJob, Scene)> {
+pub fn load(path: &Path, parameters: &BTreeMap<String, String>) -> Result<(LoadedJob, Unbuilt)> {
     Ok(load_within(path, parameters, Budget::default())?)
 }
 
 /// As [`load`], within a budget of one's own.
-pub fn load_within(path: &Path, parameters: &BTreeMap<String, String>, budget: Budget) -> Result<(LoadedJob, Scene), Fault> {
+pub fn load_within(path: &Path, parameters: &BTreeMap<String, String>, budget: Budget) -> Result<(LoadedJob, Unbuilt), Fault> {
     let name = path.display().to_string();
     let bytes = read_bounded(path, limits::SCRIPT_FILE_BYTES).map_err(Fault::new)?;
     let source = String::from_utf8(bytes).map_err(|_| Fault::new(format!("{name}: the script is not UTF-8 text")))?;
@@ -68,7 +68,7 @@ fn describe(
     name: String,
     source: String,
     parameters: &BTreeMap<String, String>,
-) -> Result<(LoadedJob, Scene), Fault> {
+) -> Result<(LoadedJob, Unbuilt), Fault> {
     let Evaluated { sandbox, job } = evaluated;
     let context = sandbox.lua().remove_app_data::<Context>().ok_or_else(|| Fault::new(format!("{name}: its context is gone")))?;
     let (scene, needed) = assemble::scene(&job.scene).map_err(|error| Fault::new(format!("{name}: {error}")))?;

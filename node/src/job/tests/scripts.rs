@@ -125,7 +125,7 @@ fn outside_models_load() {
             let parameters = [("model".to_owned(), name.clone())].into();
             let (_, scene) =
                 crate::job::load(&repository().join("scripts/model.lua"), &parameters).unwrap_or_else(|error| panic!("{error}"));
-            assert!(scene.statistics.triangles > 0, "{name}");
+            assert!(scene.build().statistics.triangles > 0, "{name}");
         }
     }
 }

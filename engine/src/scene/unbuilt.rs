@@ -1,0 +1,33 @@
+//! Scenes before their trees are built.
+
+use glam::DVec3;
+
+use super::{Scene, Statistics, Warning};
+use crate::description::Render;
+
+/// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, in half the time that building it takes.
+#[derive(Debug)]
+pub struct Unbuilt(pub(super) Scene);
+
+impl Unbuilt {
+    /// Lowest and highest coordinates, in the world, of all finite things.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        self.0.bounds()
+    }
+
+    /// What a user should know, each once.
+    pub fn warnings(&self) -> &[Warning] {
+        &self.0.warnings
+    }
+
+    /// Builds its trees.
+    pub fn build(self) -> Scene {
+        let Self(mut scene) = self;
+        let transparent = matches!(scene.render, Render::Whitted { transparent_shadows: true, .. });
+        let materials = &scene.materials;
+        let casts_no_shadow = |material: u32| transparent && materials[material as usize].passes_all_light();
+        scene.geometry.finish(scene.camera.eye(), &scene.lights, casts_no_shadow);
+        scene.statistics = Statistics::of(&scene.geometry);
+        scene
+    }
+}
