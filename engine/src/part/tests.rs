@@ -7,6 +7,7 @@ use std::{
 
 use super::*;
 use crate::{
+    accel::Simd,
     description::{
         Camera, Falloff, Film as FilmDescription, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind, Quality, Render,
         Rgb, Scene as SceneDescription, Shape, SourceId,
@@ -181,6 +182,18 @@ fn an_invalid_sample_is_black_and_counted() {
     assert_eq!((part.pixels[0], part.counters.invalid_samples), ([0.0; 3], 1));
     let part = Look::down(vec![(FLOOR, WHITE)], vec![point(1e-9, 1e38, Falloff::InverseSquare)]).part();
     assert_eq!((part.pixels[0], part.counters.invalid_samples), ([f32::MAX; 3], 0), "finite, but not in f32");
+}
+
+/// Every kind of work, with the instructions that every machine has and with the best of this one.
+#[test]
+fn pixels_are_the_same_with_all_instructions() {
+    let pixels = |simd| {
+        let scene = busy().with_simd(simd);
+        let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
+        let part = render(&scene, rect, SampleRange { first: 0, count: scene.quality.samples }, &AtomicBool::new(false)).unwrap();
+        part.pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
+    };
+    assert_eq!(pixels(Simd::Baseline), pixels(Simd::detect()));
 }
 
 /// A frame of every kind of work.

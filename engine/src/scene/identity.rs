@@ -12,6 +12,13 @@ impl Scene {
         identity.finish()
     }
 
+    /// The same scene for other instructions.
+    #[cfg(test)]
+    pub(crate) fn with_simd(mut self, simd: crate::accel::Simd) -> Self {
+        self.geometry.simd = simd;
+        self
+    }
+
     /// The same scene with other leaves in its trees.
     #[cfg(test)]
     pub(crate) fn with_leaves(mut self, rule: crate::accel::LeafRule) -> Self {

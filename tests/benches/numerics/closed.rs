@@ -9,7 +9,7 @@ use tessera_engine::{
     shape::Ray,
 };
 
-use crate::{
+use super::{
     scenes::{World, ask, ball, corners, crossings, matrix, moved, placement, towards},
     trial::{Random, Tally, bits, run},
 };

@@ -6,7 +6,7 @@ use tessera_engine::{
     shape::{Cone, Ray},
 };
 
-use crate::{
+use super::{
     double::{Double, Vector},
     scenes::{World, ask, towards},
     trial::{Random, Tally, bits, run},

@@ -12,7 +12,7 @@ use tessera_engine::{
     scene::Scene,
 };
 
-use crate::{
+use super::{
     scenes::{World, ball, frame, matrix, moved},
     trial::Tally,
 };

@@ -7,7 +7,7 @@ use tessera_engine::{
     shape::Ray,
 };
 
-use crate::{
+use super::{
     scenes::{World, ask, ball, corners, towards},
     trial::{Random, Tally, bits, run},
 };

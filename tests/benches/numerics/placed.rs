@@ -9,7 +9,7 @@ use tessera_engine::{
     shape::Ray,
 };
 
-use crate::{
+use super::{
     double::{Double, Vector},
     scenes::{World, ask, ball, frame, matrix, towards},
     trial::{CHUNK, Random, Tally, bits, run},

@@ -12,7 +12,7 @@ use tessera_engine::{
     shape::Ray,
 };
 
-use crate::trial::{Random, bits};
+use super::trial::{Random, bits};
 
 /// Objects and the assets that they need.
 #[derive(Clone, Default)]

@@ -7,7 +7,7 @@ use tessera_engine::{
     shape::Ray,
 };
 
-use crate::{
+use super::{
     scenes::{World, placement, towards},
     trial::{Random, Tally, bits, run},
 };

@@ -7,7 +7,7 @@ use tessera_engine::{
     shape::{Cone, Cuboid, Disc, Plane, Ray, Rectangle, Sphere, triangle::Sheared},
 };
 
-use crate::{
+use super::{
     scenes::{World, ask, ball, corners, placement, towards},
     trial::{Random, Tally, run},
 };
