@@ -190,7 +190,7 @@ fn pixels_are_the_same_with_all_instructions() {
     let pixels = |simd| {
         let scene = busy().with_simd(simd);
         let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
-        let part = render(&scene, rect, SampleRange { first: 0, count: scene.quality.samples }, &AtomicBool::new(false)).unwrap();
+        let part = render(&scene, rect, SampleRange { first: 0, count: scene.quality.samples.into() }, &AtomicBool::new(false)).unwrap();
         part.pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
     };
     assert_eq!(pixels(Simd::Baseline), pixels(Simd::detect()));

@@ -58,8 +58,9 @@ fn feared_meshes_are_hit_as_without_a_tree() {
 #[test]
 fn a_tree_is_the_same_however_many_threads_build_it() {
     let make = |i: u32| {
-        let [a, b, c] = random(i, if i % 8 == 0 { 0.5 } else { 0.01 });
-        [a, b, if i % 8 == 0 { b + (c - b) * 1e-3 } else { c }]
+        let is_sliver = i.is_multiple_of(8);
+        let [a, b, c] = random(i, if is_sliver { 0.5 } else { 0.01 });
+        [a, b, if is_sliver { b + (c - b) * 1e-3 } else { c }]
     };
     let mesh = MeshData {
         positions: (0..60_000).flat_map(make).map(|p| p.as_vec3().into()).collect(),
