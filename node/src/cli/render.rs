@@ -15,7 +15,7 @@ use super::{
     local::LocalFarm,
     node::cores,
     progress::{Show, event},
-    runtime::{block_on, start_logs},
+    runtime::{block_on, interrupted, start_logs},
     script::Script,
     sequence::{self, Standing, Submitted, each_frame},
 };
@@ -86,7 +86,7 @@ pub fn run(args: Args) -> Result<()> {
 async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
     let keys = args.keys.as_deref().ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
     let client = Client::connect(address, &Identity::load_client(keys)?).await?;
-    let done = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1)).await;
+    let done = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1), true).await;
     client.close().await;
     done
 }
@@ -97,7 +97,7 @@ async fn here(args: &Args, loaded: LoadedJob) -> Result<()> {
     let farm = FarmConfig { no_node_timeout, ..FarmConfig::default() };
     let mut local = LocalFarm::start(args.nodes, lanes, farm, &args.show.progress()).await?;
     let client = local.client().await?;
-    let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes));
+    let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes), false);
     tokio::pin!(work);
     let done = loop {
         tokio::select! {
@@ -115,15 +115,22 @@ async fn here(args: &Args, loaded: LoadedJob) -> Result<()> {
     done
 }
 
-/// Submits what a script says, shows how it fares, fetches its files.
-async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32) -> Result<()> {
+/// Submits what a script says, shows how it fares, fetches its files. Whether jobs go on when the user leaves.
+async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32, go_on: bool) -> Result<()> {
     let progress = args.show.progress();
     let taken = |submitted: &Submitted, description: &JobDescription| {
         description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
         progress.submitted(submitted.job.0);
     };
     let jobs = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), taken).await?;
-    sequence::follow(client, &jobs, args.show, &args.output).await
+    tokio::select! {
+        done = sequence::follow(client, &jobs, args.show, &args.output) => done,
+        () = interrupted(), if go_on => {
+            let numbers: Vec<String> = jobs.iter().map(|job| job.job.0.to_string()).collect();
+            let help = format!("the farm goes on with it; `tessera cancel {}` ends that", numbers.join(" "));
+            Err(Error::new(ExitCode::Interrupted, "interrupted").with_help(help))
+        }
+    }
 }
 
 /// A length of time given on the command line.

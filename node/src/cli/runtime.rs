@@ -39,6 +39,8 @@ pub fn block_on<T>(work: impl Future<Output = Result<T>>) -> Result<T> {
     let runtime = runtime()?;
     let result = runtime.block_on(async {
         tokio::select! {
+            // First, as it may know better what is to be said.
+            biased;
             result = work => result,
             () = interrupted() => Err(Error::new(ExitCode::Interrupted, "interrupted")),
         }

@@ -112,6 +112,7 @@ fn plan(args: &Args) -> Result<()> {
         scenario.faults.push((Duration::from_secs_f64(1.0 + share * work / power), Fault::Kill(i as usize)));
     }
     let run = World::new(scenario).run();
+    judge(&run)?;
     let (speedup, efficiency, overbalance) = run.figures(work);
     println!("parts        {:>10}", run.record.parts.len());
     println!("probe        {:>10.3} s", run.record.probe.seconds);
@@ -121,7 +122,7 @@ fn plan(args: &Args) -> Result<()> {
     println!("overbalance  {overbalance:>10.4}");
     println!("nodes lost   {:>10}", run.count(EventKind::Lost).max(run.count(EventKind::Suspected)));
     println!("outcome      {:>10}", told(run.outcome.as_ref()));
-    judge(&run)
+    Ok(())
 }
 
 /// The paper's table 1 and 2: time, speedup, efficiency and overbalance on 1, 2, 5, 10 and 15 nodes.
@@ -160,7 +161,11 @@ fn scenario(args: &Args, nodes: usize, split: Split, assign: Assign) -> Result<S
 }
 
 fn judge(run: &Run) -> Result<()> {
-    if run.violations.is_empty() { Ok(()) } else { Err(Error::new(ExitCode::Internal, run.violations.join("\n"))) }
+    match &run.outcome {
+        _ if !run.violations.is_empty() => Err(Error::new(ExitCode::Internal, run.violations.join("\n"))),
+        Some(Outcome::Failed { reason }) => Err(Error::new(ExitCode::Job, reason.as_str())),
+        _ => Ok(()),
+    }
 }
 
 fn hex(bytes: &[u8]) -> String {

@@ -47,7 +47,7 @@ impl Fetcher {
             Ok((description, assets)) => {
                 let done = self.done;
                 let compile = move || Scene::compile(&description, &assets).map(Arc::new).map_err(|error| error.to_string());
-                self.lanes.add(self.lanes.shared(compile), move |result| drop(done.send(compiled(result.and_then(|result| result)))));
+                self.lanes.add_first(self.lanes.shared(compile), move |result| drop(done.send(compiled(result.and_then(|result| result)))));
             }
             Err(error) => drop(self.done.send(compiled(Err(error)))),
         }

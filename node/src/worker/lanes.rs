@@ -24,8 +24,14 @@ pub struct Lanes {
 
 #[derive(Default)]
 struct Queue {
-    tasks: Mutex<VecDeque<Task>>,
+    tasks: Mutex<Tasks>,
     added: Condvar,
+}
+
+#[derive(Default)]
+struct Tasks {
+    first: VecDeque<Task>,
+    rest: VecDeque<Task>,
 }
 
 impl Lanes {
@@ -54,9 +60,23 @@ impl Lanes {
     /// Adds work behind what waits, and what is to be done with its result; a panic of the work is an error in words. What bounds the queue
     /// is the coordinator, who hands out a few parts a lane.
     pub fn add<T>(&self, work: impl FnOnce() -> T + Send + 'static, answer: impl FnOnce(Result<T, String>) + Send + 'static) {
+        self.put(|tasks| &mut tasks.rest, work, answer);
+    }
+
+    /// The same for what a job cannot begin without: before all parts that wait, so that the parts of another job do not keep it from its place in the queue.
+    pub fn add_first<T>(&self, work: impl FnOnce() -> T + Send + 'static, answer: impl FnOnce(Result<T, String>) + Send + 'static) {
+        self.put(|tasks| &mut tasks.first, work, answer);
+    }
+
+    fn put<T>(
+        &self,
+        place: impl FnOnce(&mut Tasks) -> &mut VecDeque<Task>,
+        work: impl FnOnce() -> T + Send + 'static,
+        answer: impl FnOnce(Result<T, String>) + Send + 'static,
+    ) {
         let task =
             move || answer(catch_unwind(AssertUnwindSafe(work)).map_err(|panic| format!("a fault of the renderer: {}", words(&*panic))));
-        self.queue.tasks.lock().unwrap_or_else(PoisonError::into_inner).push_back(Box::new(task));
+        place(&mut self.queue.tasks.lock().unwrap_or_else(PoisonError::into_inner)).push_back(Box::new(task));
         self.queue.added.notify_one();
     }
 }
@@ -73,7 +93,7 @@ impl Queue {
     fn next(&self) -> Task {
         let mut tasks = self.tasks.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
-            match tasks.pop_front() {
+            match tasks.first.pop_front().or_else(|| tasks.rest.pop_front()) {
                 Some(task) => return task,
                 None => tasks = self.added.wait(tasks).unwrap_or_else(PoisonError::into_inner),
             }

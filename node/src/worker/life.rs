@@ -207,7 +207,7 @@ impl Life {
                 let samples = part::probe(&scene, rect, stride, &cancel).ok()?;
                 Some(start.elapsed().as_secs_f64() / samples.max(1) as f64)
             };
-            self.lanes.add(measure, move |result| drop(done.send(Done::Measured(id, cell, result))));
+            self.lanes.add_first(measure, move |result| drop(done.send(Done::Measured(id, cell, result))));
         }
         self.probes.insert(id, Probe { job, asked: cells, answered: 0, cells: Vec::new(), cancel });
         Reaction::Nothing

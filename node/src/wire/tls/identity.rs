@@ -90,7 +90,7 @@ impl Identity {
         let identity = Self::read(&file).map_err(|error| error.or_help(issue_help(roles)))?;
         if !roles.contains(&identity.peer().role) {
             let message =
-                format!("{}: an identity of a {}, where that of a {} is needed", file.display(), identity.peer().role, words(roles));
+                format!("{}: an identity of {}, where that of {} is needed", file.display(), words(&[identity.peer().role]), words(roles));
             return Err(Error::new(ExitCode::File, message).with_help(issue_help(roles)));
         }
         identity
@@ -155,20 +155,23 @@ fn only_bundle(folder: &Path, roles: &[Role]) -> Result<PathBuf> {
     let words = words(roles);
     match found.len() {
         1 => Ok(found.remove(0)),
-        0 => Err(Error::new(ExitCode::File, format!("{}: no identity of a {words} in this folder", folder.display()))
-            .with_help(issue_help(roles))),
-        _ => Err(Error::new(ExitCode::File, format!("{}: several identities of a {words} in this folder", folder.display()))
+        0 => {
+            Err(Error::new(ExitCode::File, format!("{}: no identity of {words} in this folder", folder.display()))
+                .with_help(issue_help(roles)))
+        }
+        _ => Err(Error::new(ExitCode::File, format!("{}: several identities of {words} in this folder", folder.display()))
             .with_help(format!("name one of them, as in: --keys {}", found[0].display()))),
     }
 }
 
-/// Roles as one reads them: `operator, submitter or observer`.
+/// Roles as one reads them: `an operator, submitter or observer`.
 fn words(roles: &[Role]) -> String {
     let names: Vec<String> = roles.iter().map(Role::to_string).collect();
-    match names.split_last() {
+    let all = match names.split_last() {
         Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
         _ => names.concat(),
-    }
+    };
+    format!("{} {all}", if all.starts_with('o') { "an" } else { "a" })
 }
 
 fn issue_help(roles: &[Role]) -> String {
