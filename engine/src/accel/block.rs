@@ -52,7 +52,8 @@ impl Block {
         self.count = rays.len().min(limits.len()).min(SIZE);
         for (number, (ray, limit)) in rays.iter().zip(limits).take(SIZE).enumerate() {
             let mut boxed = frame.ray::<true>(ray.origin, ray.direction);
-            let is_sound = boxed.is_sound();
+            // One that is done stays so, however small the tree's unit is.
+            let is_sound = boxed.is_sound() && *limit >= 0.0;
             boxed.negative = if is_sound { boxed.negative } else { UNSOUND };
             self.limits[number] = *limit;
             self.limit[number / 8][number % 8] = if is_sound { boxed.limit(*limit) } else { -1.0 };

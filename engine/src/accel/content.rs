@@ -26,7 +26,7 @@ pub struct Part<'a> {
 pub struct Content<'a> {
     /// Where the origin of meshes stands that are neither turned nor scaled nor moved.
     pub origin: DVec3,
-    /// Instances, by their numbers; at most 2^16, of less than 2^29 triangles.
+    /// Instances, by their numbers; at most 2^16, of at most 2^29 triangles.
     pub parts: Vec<Part<'a>>,
     /// Boxes of other things.
     pub boxes: Vec<Bounds>,

@@ -2,7 +2,7 @@
 
 use super::build::{Below, BinaryNode, Box3};
 
-/// Builds a tree over at least one box whose depth is the logarithm of their number, its nodes in the order of [`super::build::build`].
+/// Builds a tree over at least one box whose depth is the logarithm of their number, its nodes in the order of [`super::build::Draft::finish`].
 pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
     let mut nodes = vec![BinaryNode { bounds: Box3::EMPTY, below: Below::Leaf(0) }];

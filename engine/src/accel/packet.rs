@@ -104,7 +104,7 @@ impl Packet {
 /// Origins and near inverses, far inverses and directions: the least of each component, and the greatest.
 type Range = [[[f32; 4]; 2]; 2];
 
-/// The ranges of eight rays that are sound.
+/// The ranges of eight rays, which are sound or all of them done.
 ///
 /// # Safety
 /// The processor has the instructions of `L`.

@@ -139,7 +139,7 @@ mod x86 {
 #[cfg(target_arch = "x86_64")]
 pub(crate) use x86::{Avx2, Baseline};
 
-#[cfg(not(target_arch = "x86_64"))]
+#[cfg(any(not(target_arch = "x86_64"), test))]
 mod portable {
     use super::Lanes;
 
@@ -165,9 +165,63 @@ mod portable {
         #[inline(always)] unsafe fn min(self, o: Self) -> Self { self.zip(o, |a, b| if a < b { a } else { b }) }
         #[inline(always)] unsafe fn max(self, o: Self) -> Self { self.zip(o, |a, b| if a > b { a } else { b }) }
         #[inline(always)] unsafe fn abs(self) -> Self { Self(self.0.map(f32::abs)) }
+        #[inline(always)] unsafe fn signed(self, o: Self) -> Self { self.zip(o, |a, b| f32::from_bits(a.to_bits() ^ (b.to_bits() & 1 << 31))) }
+        type Keys = [u16; 8];
+        #[inline(always)] unsafe fn keys(self, o: Self) -> [u16; 8] { std::array::from_fn(|i| if self.0[i] <= o.0[i] { (self.0[i].to_bits() >> 16) as u16 } else { u16::MAX }) }
+        #[inline(always)] unsafe fn least(keys: [u16; 8]) -> (u32, usize) { (1..8).fold((keys[0].into(), 0), |(least, place), i| if u32::from(keys[i]) < least { (keys[i].into(), i) } else { (least, place) }) }
+        #[inline(always)] unsafe fn without(mut keys: [u16; 8], place: usize) -> [u16; 8] { keys[place & 7] = u16::MAX; keys }
+        #[inline(always)] unsafe fn is_empty(keys: [u16; 8]) -> bool { keys == [u16::MAX; 8] }
         #[inline(always)] unsafe fn le(self, o: Self) -> u32 { (0..8).fold(0, |bits, i| bits | u32::from(self.0[i] <= o.0[i]) << i) }
     }
 }
 
 #[cfg(not(target_arch = "x86_64"))]
 pub(crate) use portable::Baseline;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a kind of lanes makes of two rows: every operation, and the order in which keys come.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
+    unsafe fn outcome<L: Lanes>(a: &[f32; 8], b: &[f32; 8]) -> (Vec<u32>, Vec<(u32, usize)>) {
+        // SAFETY: by this function's own condition.
+        unsafe {
+            let (x, y) = (L::load(a), L::load(b));
+            let rows = [x.add(y), x.sub(y), x.mul(y), x.min(y), x.max(y), x.abs(), x.signed(y), L::splat(a[3])];
+            let mut bits = vec![x.le(y)];
+            for row in rows {
+                let mut out = [0.0; 8];
+                row.store(&mut out);
+                // Which NaN it is, nobody promises.
+                bits.extend(out.map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }));
+            }
+            let (mut keys, mut order) = (x.abs().keys(y), Vec::new());
+            while !L::is_empty(keys) {
+                order.push(L::least(keys));
+                keys = L::without(keys, L::least(keys).1);
+            }
+            (bits, order)
+        }
+    }
+
+    #[test]
+    fn all_kinds_of_lanes_do_the_same() {
+        let values = [0.0, -0.0, 1.0, -1.0, 1.5, 3e38, -3e38, 1e-40, f32::INFINITY, f32::NEG_INFINITY, f32::NAN, 0.3, 0.300_000_1, 7.0];
+        for i in 0..2_000usize {
+            let row = |step: usize| std::array::from_fn(|lane| values[(i * step + lane * lane + i / (lane + 3)) % values.len()]);
+            let (a, b) = (row(5), row(11));
+            // SAFETY: every machine has the first two, and this one the last, where it is asked for.
+            unsafe {
+                let plain = outcome::<portable::Baseline>(&a, &b);
+                assert_eq!(outcome::<Baseline>(&a, &b), plain, "{a:?} {b:?}");
+                #[cfg(target_arch = "x86_64")]
+                if Simd::detect() == Simd::Avx2 {
+                    assert_eq!(outcome::<Avx2>(&a, &b), plain, "{a:?} {b:?}");
+                }
+            }
+        }
+    }
+}

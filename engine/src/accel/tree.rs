@@ -67,7 +67,7 @@ impl Tree {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     pub unsafe fn visit<L: Lanes, const ANY: bool>(&self, ray: &BoxRay, limit: f32, leaf: impl FnMut(u32) -> ControlFlow<(), f32>) {
-        // SAFETY: `build` made the nodes, which are never too deep.
+        // SAFETY: the nodes come from `Collapse`, and are never too deep.
         unsafe { traverse::<L, ANY>(&self.nodes, self.root, ray, limit, leaf) }
     }
 

@@ -1,5 +1,7 @@
 //! The trees of a scene: one over all that stands at one place, and one for every mesh that stands at many.
 
+use glam::DVec3;
+
 use super::geometry::{Geometry, Instance, Placed, Transform, kind};
 use crate::{
     accel::{Content, LeafRule, Part, Tree},
@@ -21,6 +23,9 @@ const NEAR: f64 = 65_536.0;
 
 /// ... and if the way there and back makes them larger only by this; turned and evenly scaled, they grow by less than 3.
 const GENTLE: f64 = 4.0;
+
+/// Where they only move, they round once.
+const FAR: f64 = (1u64 << 24) as f64;
 
 impl Geometry {
     /// Builds all trees. The tree of the world holds all finite shapes, but for a few listed spheres.
@@ -66,14 +71,15 @@ impl Geometry {
     }
 
     /// Sorts instances: first those whose triangles shall stand in the tree of the world, so that rays neither meet boxes around them nor are moved to them.
-    /// All meshes stand in it that are there once, and those that are there so few times that there are at most twice as many triangles.
+    /// All meshes stand in it that are there once, and those that are there so few times that there are at most twice as many triangles, as far as limits allow and if the places
+    /// are gentle.
     ///
     /// Also finds the box around everything.
     pub fn ground(&mut self) {
         self.instances.shrink_to_fit();
         let mut places = places_of(&self.instances, self.meshes.len());
         for Placed { shape: Instance { mesh, transform, .. }, .. } in &self.instances {
-            if !transform.only_moves_to(self.origin) && !is_gentle(transform, self.meshes[*mesh as usize].triangles.bounds()) {
+            if !is_gentle(transform, self.origin, self.meshes[*mesh as usize].triangles.bounds()) {
                 places[*mesh as usize] = 0;
             }
         }
@@ -82,12 +88,11 @@ impl Geometry {
         meshes.sort_by_key(|&mesh| ((places[mesh] - 1) * count(mesh), mesh));
         let most: usize = meshes.iter().map(|&mesh| count(mesh)).sum();
         let mut grounded = vec![false; places.len()];
-        let (mut parts, mut triangles, mut more) = (0, 0, 0);
+        let mut sums = [0; 3];
         for mesh in meshes {
-            parts += places[mesh];
-            triangles += places[mesh] * count(mesh);
-            more += (places[mesh] - 1) * count(mesh);
-            grounded[mesh] = parts <= MOST_PARTS && triangles <= MOST_TRIANGLES && more <= most;
+            let with = [sums[0] + places[mesh], sums[1] + places[mesh] * count(mesh), sums[2] + (places[mesh] - 1) * count(mesh)];
+            grounded[mesh] = with[0] <= MOST_PARTS && with[1] <= MOST_TRIANGLES && with[2] <= most;
+            sums = if grounded[mesh] { with } else { sums };
         }
         let is_grounded = |placed: &Placed<Instance>| grounded[placed.shape.mesh as usize];
         self.instances.sort_unstable_by_key(|placed| (!is_grounded(placed), placed.object));
@@ -108,10 +113,13 @@ fn places_of(instances: &[Placed<Instance>], meshes: usize) -> Vec<usize> {
 }
 
 /// Whether what a ray meets in the mesh's coordinates it meets in the world's, as near as boxes in f32 can tell.
-fn is_gentle(transform: &Transform, bounds: Bounds) -> bool {
+fn is_gentle(transform: &Transform, origin: DVec3, bounds: Bounds) -> bool {
     let [to_mesh, back] = transform.growths();
     let placed = transform.bounds(bounds);
     let size = max_abs(placed.max - placed.min);
     let farthest = max_abs(placed.max).max(max_abs(placed.min)).max(max_abs(transform.to_world.translation));
+    if transform.only_moves_to(origin) {
+        return farthest <= FAR * size;
+    }
     back * to_mesh <= GENTLE && farthest.max(back * max_abs(transform.to_object.translation)) <= NEAR * size
 }

@@ -4,8 +4,8 @@ use super::Scene;
 use crate::accel::Identity;
 
 impl Scene {
-    /// Equal for scenes whose trees are equal to the last bit, on every machine; others differ. Pictures do not depend on it, except where rays hit several
-    /// things at equal distances, but time does.
+    /// Equal for scenes whose trees are equal to the last bit, on every machine; others differ. Pictures do not depend on it, except in a last bit where light
+    /// goes through several clear surfaces, whose shares are multiplied as they are met; but time does.
     pub fn tree_hash(&self) -> [u8; 32] {
         let mut identity = Identity::new();
         self.geometry.trees().for_each(|tree| tree.identify(&mut identity));
