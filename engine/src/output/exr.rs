@@ -226,7 +226,9 @@ pub fn read(path: &Path) -> Result<Picture, OutputError> {
 /// As [`read`], of `length` bytes.
 #[doc(hidden)]
 pub fn read_picture(mut bytes: impl Read + Seek, length: u64) -> io::Result<Picture> {
-    check_size(&MetaData::read_from_buffered(&mut bytes, false).map_err(io_error)?, length)?;
+    let headers = MetaData::read_from_buffered(&mut bytes, false).map_err(io_error)?;
+    check_size(&headers, length)?;
+    check_compression(&headers)?;
     bytes.rewind()?;
     let reader = reader().no_deep_data().largest_resolution_level().all_channels().first_valid_layer();
     let image = reader.all_attributes().from_buffered(bytes).map_err(io_error)?;
@@ -248,6 +250,17 @@ fn check_size(file: &MetaData, length: u64) -> io::Result<()> {
         Some(Header { layer_size: Vec2(width, height), .. }) => {
             let message = format!("{width} x {height} pixels cannot be in a file of {length} bytes");
             Err(io::Error::new(io::ErrorKind::InvalidData, message))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Refuses what the crate's decoder fails at, rather than to say what is wrong, where a file is damaged; nothing that needs to be exact is compressed so.
+fn check_compression(file: &MetaData) -> io::Result<()> {
+    let is_lossy = |header: &&Header| matches!(header.compression, Compression::B44 | Compression::B44A);
+    match file.headers.iter().find(is_lossy) {
+        Some(header) => {
+            Err(io::Error::new(io::ErrorKind::InvalidData, format!("pictures compressed by {} are not read", header.compression)))
         }
         None => Ok(()),
     }
