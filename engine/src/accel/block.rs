@@ -52,11 +52,11 @@ impl Block {
         self.count = rays.len().min(limits.len()).min(SIZE);
         for (number, (ray, limit)) in rays.iter().zip(limits).take(SIZE).enumerate() {
             let mut boxed = frame.ray::<true>(ray.origin, ray.direction);
-            // One that is done stays so, however small the tree's unit is.
-            let is_sound = boxed.is_sound() && *limit >= 0.0;
+            let is_sound = boxed.is_sound();
             boxed.negative = if is_sound { boxed.negative } else { UNSOUND };
             self.limits[number] = *limit;
-            self.limit[number / 8][number % 8] = if is_sound { boxed.limit(*limit) } else { -1.0 };
+            // One that is done stays so, however small the tree's unit is.
+            self.limit[number / 8][number % 8] = if is_sound && *limit >= 0.0 { boxed.limit(*limit) } else { -1.0 };
             self.filters[number] = PackRay::new(&boxed);
             self.rays[number] = boxed;
         }

@@ -57,7 +57,7 @@ impl<'a> Content<'a> {
         let others: Vec<Box3> = boxes.iter().map(normalised).collect();
         // Each is dropped as soon as it can be: a million instances weigh enough.
         drop(boxes);
-        let Cheapest { plan, triangles, is_split } = Cheapest::of(&soup, others, leaves);
+        let Cheapest { plan, triangles } = Cheapest::of(&soup, others, leaves);
         let (mut packed, mut begins) = (Vec::new(), vec![0]);
         let leaf = |leaf: &[u32]| {
             if let Some(other) = (leaf[0] as usize).checked_sub(triangles.count(&soup)) {
@@ -73,7 +73,7 @@ impl<'a> Content<'a> {
         let collapsed = plan.carry_out(leaf);
         let pack = |at: usize| Pack::new(packed[begins[at]..begins[at + 1]].iter().map(|&triangle| soup.triangle(triangle)));
         let packs = parallel::map(begins.len() - 1, pack);
-        Tree::new(frame, collapsed, packs, is_split)
+        Tree::new(frame, collapsed, packs, triangles.is_split())
     }
 
     /// Coordinates in which triangles may stand as they are, if there are any that are not moved, and if these are not far from their origin.
@@ -153,23 +153,23 @@ impl<'a> Soup<'a> {
 /// A tree over triangles or, where that is cheaper, over parts of triangles, and over other boxes, which come after these.
 struct Cheapest {
     plan: Collapse,
-    triangles: Kept,
-    is_split: bool,
+    triangles: Parts,
 }
 
-/// Which triangle each of the first boxes is of.
-struct Kept {
-    /// None where triangles are whole.
-    parts: Vec<u32>,
-}
+/// Which triangle each of the first boxes is a part of; none where triangles are whole.
+struct Parts(Vec<u32>);
 
-impl Kept {
+impl Parts {
     fn of(&self, part: u32) -> u32 {
-        self.parts.get(part as usize).copied().unwrap_or(part)
+        self.0.get(part as usize).copied().unwrap_or(part)
     }
 
     fn count(&self, soup: &Soup) -> usize {
-        if self.parts.is_empty() { soup.count } else { self.parts.len() }
+        if self.is_split() { self.0.len() } else { soup.count }
+    }
+
+    fn is_split(&self) -> bool {
+        !self.0.is_empty()
     }
 }
 
@@ -184,11 +184,11 @@ impl Cheapest {
             let split = Draft::over(&boxes);
             if split.cost() < plain.cost() {
                 let plan = Collapse::plan(split.finish(&boxes), leaves, triangles.len() as u32);
-                return Self { plan, triangles: Kept { parts: triangles }, is_split: true };
+                return Self { plan, triangles: Parts(triangles) };
             }
         }
         drop(others);
         let plan = Collapse::plan(plain.finish(&whole), leaves, soup.count as u32);
-        Self { plan, triangles: Kept { parts: Vec::new() }, is_split: false }
+        Self { plan, triangles: Parts(Vec::new()) }
     }
 }

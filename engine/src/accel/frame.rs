@@ -16,7 +16,7 @@ pub struct Normalisation {
 }
 
 /// Bound on the relative error, in f64, of moving a ray's start, and of its coordinates in an instance that stands in a tree of the world: where lengths grow by at most 4 on the way
-/// there and back, origin and direction are wrong by up to 48 units of 2^-53 together, of which half the distance counts as start; 64 are allowed for.
+/// there and back, origin and direction are wrong by up to 50 units of 2^-53 together, of which half the distance counts as start; 64 are allowed for.
 const START_ERROR: f64 = 1.0 / (1u64 << 47) as f64;
 
 /// Smallest unit of error that filters allow for.

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{Scene, Statistics, Warning};
 use crate::description::Render;
 
-/// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, in half the time that building it takes.
+/// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, without the time that building it takes.
 #[derive(Debug)]
 pub struct Unbuilt(pub(super) Scene);
 

@@ -121,4 +121,19 @@ mod tests {
         assert_eq!(received.recv().unwrap(), Err("a fault of the renderer: no luck".to_owned()));
         assert_eq!(received.recv().unwrap(), Ok(7));
     }
+
+    #[test]
+    fn what_a_job_begins_with_comes_before_parts_that_wait() {
+        let lanes = Lanes::start(1).unwrap();
+        let (hold, held) = mpsc::channel::<()>();
+        let (sender, done) = mpsc::channel();
+        lanes.add(move || held.recv(), |_| ());
+        for (name, is_first) in [("part", false), ("another part", false), ("scene", true), ("probe", true)] {
+            let sender = sender.clone();
+            let answer = move |result: Result<&'static str, String>| sender.send(result.unwrap()).unwrap();
+            if is_first { lanes.add_first(move || name, answer) } else { lanes.add(move || name, answer) }
+        }
+        hold.send(()).unwrap();
+        assert_eq!(done.iter().take(4).collect::<Vec<_>>(), ["scene", "probe", "part", "another part"]);
+    }
 }
