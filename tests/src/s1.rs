@@ -1,7 +1,8 @@
 //! Scene S1, "whitted": the scene that POV-Ray is compared on, built from its definition in numbers.
 
 use tessera_engine::description::{
-    Camera, Falloff, Film, Filter, Frame, Group, Light, Material, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture,
+    Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId,
+    Texture,
 };
 
 /// One sphere of the scene.
@@ -62,7 +63,7 @@ fn color(k: f64) -> [f64; 3] {
 
 /// The frame as a job would describe it: one sample at the centre of each pixel.
 pub fn frame(width: u32, height: u32) -> Frame {
-    let mut scene = Scene { background: BACKGROUND.map(|c| c as f32), ..Scene::default() };
+    let mut scene = Scene { background: Environment::Constant(BACKGROUND.map(|c| c as f32)), ..Scene::default() };
     let [even, odd] = FLOOR.map(|albedo| [albedo as f32; 3]);
     scene.textures.push(Texture::Checker { even, odd, size: 1.0 });
     let mut group = Group::default();
@@ -77,7 +78,7 @@ pub fn frame(width: u32, height: u32) -> Frame {
         let material = match kind {
             Kind::Diffuse(albedo) => Material::Diffuse { reflectance: albedo.map(|c| c as f32), texture: None },
             Kind::Mirror => Material::Mirror { reflectance: [0.9; 3] },
-            Kind::Glass => Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [1.0; 3] },
+            Kind::Glass => Material::smooth_glass(1.5, [1.0; 3]),
         };
         add(Shape::Sphere { center, radius }, material);
     }
@@ -93,7 +94,7 @@ pub fn frame(width: u32, height: u32) -> Frame {
     let [eye, look_at] = CAMERA;
     Frame {
         scene,
-        camera: Camera::Perspective { eye, look_at, up: [0.0, 1.0, 0.0], horizontal_fov: 45.0 },
+        camera: Camera::pinhole(eye, look_at, [0.0, 1.0, 0.0], 45.0),
         film: Film { width, height, filter: Filter::Point },
         render: Render::Whitted { max_depth: 8, transparent_shadows: true, min_weight: 1.0 / 255.0 },
         quality: Quality { samples: 1 },

@@ -18,8 +18,14 @@ pub struct Film {
 pub enum Filter {
     /// The pixel's own square, evenly.
     Box,
-    /// The pixel's centre alone; further samples repeat it.
+    /// The pixel's centre alone; where nothing else is left to chance, further samples repeat it.
     Point,
+    /// A Gaussian of standard deviation 0.5 pixels, cut off 1.5 pixels from the centre and lowered so that it ends at 0.
+    Gaussian,
+    /// Blackman and Harris's window, 1.5 pixels to either side: much like a Gaussian, but ends smoothly.
+    BlackmanHarris,
+    /// Mitchell and Netravali's cubic with B = C = 1/3, 2 pixels to either side: sharper, with a slight dark rim beside bright edges.
+    Mitchell,
 }
 
 /// How accurate the frame shall be.

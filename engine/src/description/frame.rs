@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Camera, Film, Group, GroupId, Light, Material, Quality, Render, Rgb, Texture};
+use super::{Camera, Environment, Film, Group, GroupId, Light, Material, Medium, Quality, Render, Texture};
 use crate::REVISION;
 
 /// All that decides the pixels of one frame.
@@ -38,7 +38,9 @@ pub struct Scene {
     /// Lights, in world coordinates.
     pub lights: Vec<Light>,
     /// Radiance of rays that leave the scene.
-    pub background: Rgb,
+    pub background: Environment,
+    /// What fills space outside of everything, for `path`.
+    pub medium: Option<Medium>,
 }
 
 /// The identity of a picture: equal hashes promise equal bytes, on any farm.

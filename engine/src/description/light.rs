@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{Rgb, SourceId};
 
-/// A light source without extent.
+/// A light source without extent, or infinitely far away. Surfaces that shine have a material that says so.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Light {
     /// Shines from a point to all sides.
@@ -26,6 +26,24 @@ pub enum Light {
         direction: [f64; 3],
         /// Irradiance on a surface that faces the light: a white diffuse surface shows radiance `irradiance / pi`.
         irradiance: Rgb,
+        /// Angle in degrees, in [0, 180), across which it is spread evenly, as the sun's is across 0.533; 0 casts hard shadows. For `path`.
+        angle: f64,
+        /// Where the script made it.
+        #[serde(skip)]
+        source: SourceId,
+    },
+    /// Shines from a point into a cone.
+    Spot {
+        /// Position in the world.
+        position: [f64; 3],
+        /// The middle of the cone; any length but 0.
+        direction: [f64; 3],
+        /// Radiant intensity (power per steradian) inside the inner cone.
+        intensity: Rgb,
+        /// Angle in degrees between the middle and where it begins to weaken, in [0, `outer`].
+        inner: f64,
+        /// Angle in degrees between the middle and where it ends, in (0, 180].
+        outer: f64,
         /// Where the script made it.
         #[serde(skip)]
         source: SourceId,

@@ -5,10 +5,12 @@
 
 mod asset;
 mod camera;
+mod environment;
 mod film;
 mod frame;
 mod light;
 mod material;
+mod medium;
 mod object;
 mod render;
 mod source;
@@ -16,10 +18,12 @@ mod texture;
 
 pub use asset::{AssetError, AssetId, AssetSource, MemoryAssets, MeshData};
 pub use camera::Camera;
+pub use environment::Environment;
 pub use film::{Film, Filter, Quality};
 pub use frame::{Frame, FrameHash, Scene};
 pub use light::{Falloff, Light};
-pub use material::Material;
+pub use material::{Fresnel, Material};
+pub use medium::Medium;
 pub use object::{Group, Matrix, Model, ModelFormat, Object, ObjectKind, Shape};
 pub use render::Render;
 pub use source::{Source, SourceId, Sources};

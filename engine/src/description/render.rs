@@ -17,4 +17,12 @@ pub enum Render {
         /// Rays whose weight in the pixel is this or less are not traced; 0 traces all.
         min_weight: f64,
     },
+    /// Path tracing: all light, with an error that falls with the number of samples.
+    Path {
+        /// Longest chain of rays, the camera's ray included; at least 1. What a longer chain would bring is left out: 1 shows only what shines, 2 adds
+        /// light that comes straight from the lights.
+        max_depth: u32,
+        /// Chains at least this long are ended by chance, with no error in the mean (Russian roulette); `max_depth` for never.
+        roulette_depth: u32,
+    },
 }

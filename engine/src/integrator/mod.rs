@@ -1,20 +1,23 @@
 //! Integrators: how much light comes along a ray.
 
 mod direct;
+mod path;
 mod raycast;
+mod shading;
 mod whitted;
 
 use glam::DVec3;
 
+pub use path::Path;
 pub use raycast::Raycast;
 pub use whitted::Whitted;
 
-use crate::{scene::Tracer, shape::Ray};
+use crate::{sampling::Sampler, scene::Tracer, shape::Ray};
 
-/// A way to follow light. It may keep memory from ray to ray, but what it computes depends on scene and ray alone.
+/// A way to follow light. It may keep memory from ray to ray, but what it computes depends on scene, ray and sample alone.
 pub trait Integrator {
     /// Radiance that arrives along a ray from the camera.
-    fn radiance(&mut self, scene: impl Tracer, ray: &Ray) -> DVec3;
+    fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3;
 
     /// Rays traced so far, besides those from the camera.
     fn counts(&self) -> RayCounts;

@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
-use super::{Integrator, RayCounts, direct, rgb};
+use super::{Integrator, RayCounts, direct};
 use crate::{
     material::{
-        Bsdf,
+        Ideal,
         dielectric::{interface, reflect},
     },
+    sampling::Sampler,
     scene::{Surface, Tracer},
     shape::Ray,
 };
@@ -44,14 +45,14 @@ impl Whitted {
 
 impl Integrator for Whitted {
     #[inline(always)]
-    fn radiance(&mut self, scene: impl Tracer, ray: &Ray) -> DVec3 {
+    fn radiance(&mut self, scene: impl Tracer, ray: &Ray, _: &Sampler) -> DVec3 {
         let mut radiance = DVec3::ZERO;
         let mut branch = Branch { ray: *ray, weight: DVec3::ONE, depth: 1 };
         loop {
             let met = if branch.depth == 1 { scene.closest_from_eye(&branch.ray) } else { scene.closest(&branch.ray) };
             let goes_on = match &met {
                 None => {
-                    radiance += branch.weight * rgb(scene.background);
+                    radiance += branch.weight * scene.environment.radiance(branch.ray.direction);
                     false
                 }
                 Some(surface) => self.meet(scene, surface, &mut branch, &mut radiance),
@@ -77,15 +78,15 @@ impl Whitted {
     fn meet(&mut self, scene: impl Tracer, surface: &Surface, branch: &mut Branch, radiance: &mut DVec3) -> bool {
         let material = &scene.materials[surface.material as usize];
         let direction = branch.ray.direction;
-        match material.bsdf {
-            Bsdf::Diffuse { reflectance, .. } => {
+        match material.ideal {
+            Ideal::Diffuse { reflectance, .. } => {
                 let albedo = direct::albedo(scene, material, surface, reflectance);
                 *radiance +=
                     branch.weight * direct::reflected(scene, surface, direction, albedo, |light, ray| self.visible(scene, light, ray));
                 false
             }
-            Bsdf::Mirror { reflectance } => self.follow(branch, surface, mirrored(direction, surface), reflectance),
-            Bsdf::Glass { ior, reflectance, transmittance } => {
+            Ideal::Mirror { reflectance } => self.follow(branch, surface, mirrored(direction, surface), reflectance),
+            Ideal::Glass { ior, reflectance, transmittance } => {
                 let at = interface(direction, shading_normal(direction, surface), ior);
                 let Some(refracted) = at.refracted else {
                     return self.follow(branch, surface, mirrored(direction, surface), reflectance);
@@ -125,12 +126,12 @@ impl Whitted {
             if !self.transparent_shadows {
                 return true;
             }
-            match scene.materials[material as usize].bsdf {
-                Bsdf::Glass { transmittance, .. } => {
+            match scene.materials[material as usize].ideal {
+                Ideal::Glass { transmittance, .. } => {
                     share *= transmittance;
                     share == DVec3::ZERO
                 }
-                Bsdf::Diffuse { .. } | Bsdf::Mirror { .. } => true,
+                Ideal::Diffuse { .. } | Ideal::Mirror { .. } => true,
             }
         });
         if blocked { DVec3::ZERO } else { share }

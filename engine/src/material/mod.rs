@@ -1,17 +1,43 @@
-//! Materials, compiled: how a surface scatters light, and where it is cut away.
+//! Materials, compiled: how a surface scatters and emits light, and where it is cut away.
 
+mod bsdf;
+mod conductor;
 pub mod dielectric;
+mod diffuse;
+mod energy;
+mod ideal;
+mod local;
+pub mod metals;
+mod microfacet;
+mod mirror;
+mod recipe;
+mod refractive;
+mod table;
 
 use glam::DVec3;
 
-use crate::assets::ModelMaterial;
-use crate::description;
+pub use self::{
+    bsdf::{Bsdf, Scattered},
+    ideal::Ideal,
+    recipe::Recipe,
+};
+
+use crate::{
+    assets::ModelMaterial,
+    description::{self, Rgb},
+    scene::Surface,
+    texture::Texture,
+};
 
 /// A compiled material.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Material {
+    /// What simple models of light make of it.
+    pub ideal: Ideal,
     /// How the surface scatters light.
-    pub bsdf: Bsdf,
+    pub recipe: Recipe,
+    /// What it gives off by itself.
+    pub emission: Option<Emission>,
     /// The surface is absent where its alpha (`base_alpha` times the texture's) is below this (glTF's alpha mode `MASK`).
     pub alpha_cutoff: Option<f32>,
     /// Alpha of the material, in [0, 1].
@@ -22,51 +48,39 @@ pub struct Material {
     pub color_from_vertices: bool,
 }
 
-/// A bidirectional scattering distribution function.
+/// What a surface gives off by itself, the same in all directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Bsdf {
-    /// Lambertian reflection, on both sides.
-    Diffuse {
-        /// Albedo, multiplied by `texture` where there is one.
-        reflectance: DVec3,
-        /// Index of the compiled texture.
-        texture: Option<u32>,
-    },
-    /// Perfect specular reflection, on both sides.
-    Mirror {
-        /// The share of light that is reflected.
-        reflectance: DVec3,
-    },
-    /// A smooth dielectric.
-    Glass {
-        /// Index of refraction of the inside, relative to the outside.
-        ior: f64,
-        /// Multiplies what is reflected.
-        reflectance: DVec3,
-        /// Multiplies what is refracted.
-        transmittance: DVec3,
-    },
+pub struct Emission {
+    /// Radiance.
+    pub radiance: DVec3,
+    /// Index of a compiled texture that multiplies it.
+    pub texture: Option<u32>,
+    /// Whether it shines on the side that the normal does not point to, too.
+    pub two_sided: bool,
 }
 
 impl Material {
     /// Prepares a material of the description; texture indices stay what they are.
     pub fn compile(material: &description::Material) -> Self {
-        let bsdf = match material {
-            description::Material::Diffuse { reflectance, texture } => Bsdf::Diffuse { reflectance: rgb(*reflectance), texture: *texture },
-            description::Material::Mirror { reflectance } => Bsdf::Mirror { reflectance: rgb(*reflectance) },
-            description::Material::Glass { ior, reflectance, transmittance } => {
-                Bsdf::Glass { ior: *ior, reflectance: rgb(*reflectance), transmittance: rgb(*transmittance) }
+        let emission = match material {
+            description::Material::Emitter { radiance, texture, two_sided } if radiance.iter().any(|x| *x > 0.0) => {
+                Some(Emission { radiance: rgb(*radiance), texture: *texture, two_sided: *two_sided })
             }
+            _ => None,
         };
-        Self { bsdf, alpha_cutoff: None, base_alpha: 1.0, double_sided: true, color_from_vertices: false }
+        let (ideal, recipe) = (Ideal::of(material), Recipe::of(material));
+        Self { ideal, recipe, emission, alpha_cutoff: None, base_alpha: 1.0, double_sided: true, color_from_vertices: false }
     }
 
     /// Prepares a material of a model file whose textures begin at index `first_texture` of the scene's.
     pub fn from_model(material: &ModelMaterial, first_texture: u32) -> Self {
         let [r, g, b, alpha] = material.base_color;
         let texture = material.texture.and_then(|index| u32::try_from(index).ok()).map(|index| first_texture + index);
+        let reflectance = rgb([r, g, b]);
         Self {
-            bsdf: Bsdf::Diffuse { reflectance: rgb([r, g, b]), texture },
+            ideal: Ideal::Diffuse { reflectance, texture },
+            recipe: Recipe::Diffuse { reflectance, texture },
+            emission: None,
             alpha_cutoff: material.alpha_cutoff,
             base_alpha: alpha,
             double_sided: material.double_sided,
@@ -74,18 +88,27 @@ impl Material {
         }
     }
 
+    /// How it scatters light at a point; `None` if it does not.
+    #[inline(always)]
+    pub fn bsdf(&self, textures: &[Texture], surface: &Surface) -> Option<Bsdf<'_>> {
+        self.recipe.bsdf(self, textures, surface)
+    }
+
+    /// Whether it asks for texture coordinates.
+    #[inline]
+    pub fn is_textured(&self) -> bool {
+        self.ideal.texture().is_some() || self.emission.is_some_and(|emission| emission.texture.is_some())
+    }
+
     /// Texture of the reflectance, where there is one.
     #[inline]
     pub fn texture(&self) -> Option<u32> {
-        match self.bsdf {
-            Bsdf::Diffuse { texture, .. } => texture,
-            Bsdf::Mirror { .. } | Bsdf::Glass { .. } => None,
-        }
+        self.ideal.texture()
     }
 
     /// Whether what goes through the surface is not dimmed, but for what it reflects.
     pub fn passes_all_light(&self) -> bool {
-        matches!(self.bsdf, Bsdf::Glass { transmittance: DVec3::ONE, .. })
+        matches!(self.ideal, Ideal::Glass { transmittance: DVec3::ONE, .. })
     }
 
     /// Whether the surface may be absent somewhere, so that a hit must be asked for its alpha.
@@ -95,6 +118,7 @@ impl Material {
     }
 }
 
-fn rgb(color: description::Rgb) -> DVec3 {
+/// A colour of the description in the engine's own precision.
+pub(crate) fn rgb(color: Rgb) -> DVec3 {
     DVec3::new(color[0].into(), color[1].into(), color[2].into())
 }

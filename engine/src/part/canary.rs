@@ -9,8 +9,8 @@ use super::{Rect, RenderedPart, SampleRange, render};
 use crate::{
     accel::{Content, Identity, LeafRule, Tree, Triangles},
     description::{
-        Camera, ColorSpace, Falloff, Film, Filter, Frame, Group, Light, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind,
-        Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+        Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, Matrix, MemoryAssets, MeshData, Object,
+        ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     scene,
 };
@@ -56,7 +56,7 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
     let mut assets = MemoryAssets::default();
     let mesh = assets.insert(postcard::to_stdvec(&bumps()).map_err(fault)?);
     let image = assets.insert(stripes().map_err(fault)?);
-    let mut scene = Scene { background: [0.3, 0.5, 0.8], lights: lights(), ..Scene::default() };
+    let mut scene = Scene { background: Environment::Constant([0.3, 0.5, 0.8]), lights: lights(), ..Scene::default() };
     scene.textures = vec![
         Texture::Checker { even: [0.9, 0.85, 0.8], odd: [0.1, 0.15, 0.2], size: 0.7 },
         Texture::Image { file: image, color_space: ColorSpace::Srgb, wrap: [Wrap::Repeat, Wrap::Mirror], source: SourceId::default() },
@@ -65,7 +65,7 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
         Material::Diffuse { reflectance: [0.9; 3], texture: Some(0) },
         Material::Diffuse { reflectance: [0.8, 0.9, 1.0], texture: Some(1) },
         Material::Mirror { reflectance: [0.9, 0.8, 0.7] },
-        Material::Glass { ior: 1.45, reflectance: [1.0; 3], transmittance: [0.95, 1.0, 0.95] },
+        Material::smooth_glass(1.45, [0.95, 1.0, 0.95]),
     ];
     let cluster = Group {
         objects: vec![
@@ -99,7 +99,7 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
     scene.root = 1;
     let frame = Frame {
         scene,
-        camera: Camera::Perspective { eye: [0.4, 1.9, 5.2], look_at: [-0.2, 0.6, 0.0], up: [0.0, 1.0, 0.0], horizontal_fov: 48.0 },
+        camera: Camera::pinhole([0.4, 1.9, 5.2], [-0.2, 0.6, 0.0], [0.0, 1.0, 0.0], 48.0),
         film: Film { width: 64, height: 48, filter: Filter::Box },
         render: Render::Whitted { max_depth: 6, transparent_shadows: true, min_weight: 0.0 },
         quality: Quality { samples: 2 },
@@ -126,7 +126,7 @@ fn lights() -> Vec<Light> {
     vec![
         Light::Point { position: [-3.0, 5.0, 4.0], intensity: [60.0, 55.0, 50.0], falloff: Falloff::InverseSquare, source },
         Light::Point { position: [4.0, 3.0, 2.0], intensity: [0.2, 0.2, 0.3], falloff: Falloff::None, source },
-        Light::Directional { direction: [0.3, -1.0, -0.2], irradiance: [0.8, 0.8, 0.7], source },
+        Light::Directional { direction: [0.3, -1.0, -0.2], irradiance: [0.8, 0.8, 0.7], angle: 0.0, source },
     ]
 }
 

@@ -2,13 +2,13 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange};
 use crate::{
     description::Render,
-    integrator::{Integrator, Raycast, Whitted},
-    sampling::film_point,
+    integrator::{Integrator, Path, Raycast, Whitted},
+    sampling::Sampler,
     scene::{Scene, Tracer, Work},
 };
 
@@ -65,6 +65,9 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
             scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
+        Render::Path { max_depth, roulette_depth } => {
+            scene.run(Tracing::new(Path::new(max_depth, roulette_depth), lattice, samples, cancel))
+        }
     }
 }
 
@@ -120,11 +123,14 @@ impl<'c, I: Integrator> Tracing<'c, I> {
     #[inline(always)]
     fn sample(&mut self, scene: impl Tracer, pixel: (u32, u32), index: u64) -> DVec3 {
         self.counters.camera_rays += 1;
-        let (x, y) = film_point(scene.film.filter, scene.seed, pixel, index);
-        let ray = scene.camera.ray(x, y);
-        let radiance = self.integrator.radiance(scene, &ray);
+        let sampler = Sampler::new(scene.seed, pixel, index);
+        let (offset, weight) = scene.filter.sample(sampler.pair(Sampler::FILM));
+        let (x, y) = (f64::from(pixel.0) + 0.5 + offset.x, f64::from(pixel.1) + 0.5 + offset.y);
+        let lens = if scene.camera.needs_lens() { sampler.pair(Sampler::LENS) } else { DVec2::ZERO };
+        let ray = scene.camera.ray(x, y, lens);
+        let radiance = self.integrator.radiance(scene, &ray, &sampler);
         if radiance.is_finite() && radiance.min_element() >= 0.0 {
-            return radiance;
+            return radiance * weight;
         }
         self.counters.invalid_samples += 1;
         DVec3::ZERO

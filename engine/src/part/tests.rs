@@ -9,8 +9,8 @@ use super::*;
 use crate::{
     accel::Simd,
     description::{
-        Camera, Falloff, Film as FilmDescription, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind, Quality, Render,
-        Rgb, Scene as SceneDescription, Shape, SourceId,
+        Camera, Environment, Falloff, Film as FilmDescription, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind,
+        Quality, Render, Rgb, Scene as SceneDescription, Shape, SourceId,
     },
     film::Film,
     scene::Scene,
@@ -24,7 +24,7 @@ const WHITE: Material = Material::Diffuse { reflectance: [1.0; 3], texture: None
 const FLOOR: Shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 1.0, 0.0] };
 
 fn glass(tint: f32) -> Material {
-    Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [tint; 3] }
+    Material::smooth_glass(1.5, [tint; 3])
 }
 
 /// What one ray through the middle of the only pixel sees of some shapes.
@@ -43,7 +43,8 @@ impl Look {
     }
 
     fn part(self) -> RenderedPart {
-        let mut scene = SceneDescription { lights: self.lights, background: self.background, ..SceneDescription::default() };
+        let mut scene =
+            SceneDescription { lights: self.lights, background: Environment::Constant(self.background), ..SceneDescription::default() };
         let mut group = Group::default();
         for (index, (shape, material)) in self.shapes.into_iter().enumerate() {
             scene.materials.push(material);
@@ -53,7 +54,7 @@ impl Look {
         scene.groups.push(group);
         let frame = Frame {
             scene,
-            camera: Camera::Perspective { eye: self.eye, look_at: self.at, up: [0.0, 0.0, 1.0], horizontal_fov: 10.0 },
+            camera: Camera::pinhole(self.eye, self.at, [0.0, 0.0, 1.0], 10.0),
             film: FilmDescription { width: 1, height: 1, filter: Filter::Point },
             render: self.render,
             quality: Quality { samples: 1 },
@@ -81,7 +82,7 @@ fn close(a: f64, b: f64) {
 fn a_white_floor_under_a_directional_light_shows_irradiance_by_pi() {
     for (direction, cos) in [([0.0, -2.0, 0.0], 1.0), ([3.0, -4.0, 0.0], 0.8), ([1.0, 0.0, 0.0], 0.0), ([0.0, 1.0, 0.0], 0.0)] {
         for render in [Render::Raycast, WHITTED] {
-            let light = Light::Directional { direction, irradiance: [2.0; 3], source: SourceId::default() };
+            let light = Light::Directional { direction, irradiance: [2.0; 3], angle: 0.0, source: SourceId::default() };
             close(Look { render, ..Look::down(vec![(FLOOR, WHITE)], vec![light]) }.radiance(), 2.0 / PI * cos);
         }
     }

@@ -2,20 +2,26 @@
 
 use super::{
     Scene, Statistics, Unbuilt,
-    error::CompileError,
+    emitters::emitters,
+    error::{CompileError, Warning},
     place::{FARTHEST, Placer},
 };
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use crate::{
     camera::Camera,
-    description::{self, AssetSource, Falloff, Frame, SourceId},
-    light::Light,
-    material::Material,
-    texture::Texture,
+    description::{self, AssetSource, Frame, Fresnel, Rgb, SourceId},
+    light::{Environment, ImageEnvironment, Light, LightSampler, SunSky, turned},
+    material::{Material, rgb},
+    math::max_abs,
+    sampling::PixelFilter,
+    texture::{Image, Texture},
 };
 
 type Result<T> = std::result::Result<T, CompileError>;
+
+/// Rows of the picture of a clear sky.
+const SKY_ROWS: u32 = 512;
 
 /// Most rows and columns of a film.
 const LARGEST_FILM: u32 = 65_536;
@@ -54,11 +60,24 @@ impl Scene {
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let materials =
             frame.scene.materials.iter().enumerate().map(|(i, m)| material(i, m, textures.len())).collect::<Result<Vec<_>>>()?;
-        let placed = Placer::new(&frame.scene, -begin, assets, materials, textures).place()?;
+        let (environment, sun) = environment(&frame.scene.background, assets)?;
+        let mut lights = lights;
+        lights.extend(sun);
+        let mut placed = Placer::new(&frame.scene, -begin, assets, materials, textures).place()?;
+        let (emitters, hidden) = emitters(&placed.geometry, &placed.materials);
+        if hidden > 0 {
+            let message = format!(
+                "{hidden} objects shine that light is not sampled from (cones, cylinders, planes, unevenly scaled spheres): their light is noisy"
+            );
+            placed.warnings.push(Warning { source: SourceId::default(), message });
+        }
+        let light_sampler = LightSampler::new(emitters, &lights, &environment);
         Ok(Unbuilt(Self {
             camera,
             lights,
-            background: frame.scene.background,
+            environment,
+            light_sampler,
+            filter: PixelFilter::of(frame.film.filter),
             film: frame.film.clone(),
             render: frame.render.clone(),
             quality: frame.quality.clone(),
@@ -91,24 +110,75 @@ fn check_film(frame: &Frame) -> Result<()> {
     if frame.quality.samples == 0 {
         return Err(CompileError::new(SourceId::default(), "quality.samples is 0; a picture needs at least 1"));
     }
-    if !is_color(&frame.scene.background) {
-        return Err(CompileError::new(SourceId::default(), "the background must be finite and not negative"));
-    }
     Ok(())
 }
 
-fn light(light: &description::Light) -> Result<Light> {
-    use description::Light::{Directional, Point};
-    let (source, place, strength) = match light {
-        Point { position, intensity, source, falloff: Falloff::InverseSquare | Falloff::None } => (*source, position, intensity),
-        Directional { direction, irradiance, source } => {
-            if direction.iter().all(|x| *x == 0.0) {
-                return Err(CompileError::new(*source, "the light's direction is 0"));
+/// What surrounds the scene, and its sun.
+fn environment(environment: &description::Environment, assets: &dyn AssetSource) -> Result<(Environment, Option<Light>)> {
+    match environment {
+        description::Environment::Constant(radiance) => {
+            if !is_color(radiance) {
+                return Err(CompileError::new(SourceId::default(), "the background must be finite and not negative"));
             }
-            (*source, direction, irradiance)
+            Ok((Environment::Constant(rgb(*radiance)), None))
+        }
+        description::Environment::Image { file, scale, rotation, source } => {
+            let wrong = |message: String| CompileError::new(*source, message);
+            if !is_color(scale) || !rotation.is_finite() {
+                return Err(wrong("the environment's scale and rotation must be finite, and the scale not negative".into()));
+            }
+            let bytes = assets.bytes(*file).ok_or_else(|| wrong(format!("the image's bytes ({file}) are not here")))?;
+            let image = Image::decode(&bytes, description::ColorSpace::Srgb).map_err(|error| CompileError::asset(*source, error))?;
+            let [width, height] = image.size();
+            let scaled = |[r, g, b, _]: [f32; 4]| [r * scale[0], g * scale[1], b * scale[2]];
+            let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| scaled(image.pixel(x, y))).collect();
+            let turn = turned(*rotation);
+            Ok((Environment::Image(ImageEnvironment::new(width, height, pixels, turn, 1.0).map_err(wrong)?), None))
+        }
+        description::Environment::Sky { sun, turbidity, ground, scale, disc, source } => {
+            let towards = DVec3::from(*sun);
+            let fits = towards.is_finite() && towards != DVec3::ZERO && is_color(ground) && *scale >= 0.0 && scale.is_finite();
+            if !(fits && (1.0..=20.0).contains(turbidity)) {
+                let message =
+                    "the sky's sun must have a direction, its turbidity lie in 1 to 20, its ground and scale be finite and not negative";
+                return Err(CompileError::new(*source, message));
+            }
+            let towards = (towards / max_abs(towards)).normalize();
+            let sky = SunSky { sun_direction: towards, turbidity: *turbidity, ground_albedo: rgb(*ground) };
+            let (width, height, pixels) = sky.sky(SKY_ROWS);
+            let image = ImageEnvironment::new(width, height, pixels, DMat3::IDENTITY, *scale);
+            let image = image.map_err(|message| CompileError::new(*source, message))?;
+            let (radiance, degrees) = sky.sun();
+            let sun = Light::disc(towards, radiance * *scale, degrees.to_radians());
+            Ok((Environment::Image(image), disc.then_some(sun).filter(|_| radiance.max_element() > 0.0)))
+        }
+    }
+}
+
+fn light(light: &description::Light) -> Result<Light> {
+    use description::Light::{Directional, Point, Spot};
+    let (source, place, direction, strength) = match light {
+        Point { position, intensity, source, .. } => (*source, position, None, intensity),
+        Directional { direction, irradiance, source, angle } => {
+            if !(0.0..180.0).contains(angle) {
+                return Err(CompileError::new(*source, "the light's angle must lie in 0 to 180 degrees"));
+            }
+            (*source, direction, Some(direction), irradiance)
+        }
+        Spot { position, direction, intensity, inner, outer, source } => {
+            if !(*inner >= 0.0 && inner <= outer && *outer > 0.0 && *outer <= 180.0) {
+                return Err(CompileError::new(
+                    *source,
+                    "the light's angles must lie in 0 to 180 degrees, the inner one within the outer one",
+                ));
+            }
+            (*source, position, Some(direction), intensity)
         }
     };
-    if !place.iter().all(|x| x.is_finite()) {
+    if direction.is_some_and(|direction| direction.iter().all(|x| *x == 0.0)) {
+        return Err(CompileError::new(source, "the light's direction is 0"));
+    }
+    if !place.iter().chain(direction.into_iter().flatten()).all(|x| x.is_finite()) {
         return Err(CompileError::new(source, "the light's position or direction is not finite"));
     }
     if place.iter().any(|x| x.abs() > FARTHEST) {
@@ -129,21 +199,47 @@ fn texture(texture: &description::Texture, assets: &dyn AssetSource) -> Result<T
 }
 
 fn material(index: usize, material: &description::Material, textures: usize) -> Result<Material> {
+    use description::Material::{Boundary, Diffuse, Emitter, Glass, Metal, Mirror, Plastic, RoughDiffuse};
     let wrong = |what: &str| Err(CompileError::new(SourceId::default(), format!("material {index}: {what}")));
-    let colors: &[&description::Rgb] = match material {
-        description::Material::Diffuse { texture: Some(texture), .. } if *texture as usize >= textures => {
-            return wrong("it names a texture that does not exist");
+    let (colors, texture, roughness, ior, medium): (&[&Rgb], _, &[f64], _, _) = match material {
+        Diffuse { reflectance, texture } => (&[reflectance], *texture, &[], 1.0, None),
+        RoughDiffuse { reflectance, texture, roughness } => (&[reflectance], *texture, &[*roughness], 1.0, None),
+        Mirror { reflectance } => (&[reflectance], None, &[], 1.0, None),
+        Metal { fresnel, roughness, .. } => match fresnel {
+            Fresnel::Index { eta, k } => (&[eta, k], None, roughness, 1.0, None),
+            Fresnel::Schlick(color) | Fresnel::Constant(color) => (&[color], None, roughness, 1.0, None),
+        },
+        Glass { ior, reflectance, transmittance, roughness, interior, .. } => {
+            (&[reflectance, transmittance], None, &[*roughness], *ior, interior.as_ref())
         }
-        description::Material::Glass { ior, .. } if !(*ior > 0.0 && ior.is_finite()) => {
-            return wrong("its index of refraction must be above 0");
-        }
-        description::Material::Diffuse { reflectance, .. } | description::Material::Mirror { reflectance } => &[reflectance],
-        description::Material::Glass { reflectance, transmittance, .. } => &[reflectance, transmittance],
+        Plastic { reflectance, texture, ior, roughness } => (&[reflectance], *texture, &[*roughness], *ior, None),
+        Emitter { radiance, texture, .. } => (&[radiance], *texture, &[], 1.0, None),
+        Boundary { interior } => (&[], None, &[], 1.0, Some(interior)),
     };
+    if texture.is_some_and(|texture| texture as usize >= textures) {
+        return wrong("it names a texture that does not exist");
+    }
+    if !(ior > 0.0 && ior.is_finite()) {
+        return wrong("its index of refraction must be above 0");
+    }
+    if !roughness.iter().all(|roughness| (0.0..=1.0).contains(roughness)) {
+        return wrong("its roughness must lie in 0 to 1");
+    }
     if !colors.iter().all(|color| is_color(color)) {
         return wrong("its colours must be finite and not negative");
     }
+    medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("material {index}: {error}")))?;
     Ok(Material::compile(material))
+}
+
+fn check_medium(medium: &description::Medium) -> std::result::Result<(), &'static str> {
+    if !is_color(&medium.absorption) || !is_color(&medium.scattering) {
+        return Err("its medium's coefficients must be finite and not negative");
+    }
+    if !(medium.anisotropy > -1.0 && medium.anisotropy < 1.0) {
+        return Err("its medium's anisotropy must lie between -1 and 1");
+    }
+    Ok(())
 }
 
 fn is_color(color: &description::Rgb) -> bool {

@@ -109,12 +109,12 @@ pub struct Geometry {
 
 impl Geometry {
     /// Builds all trees, and prepares spheres, where they are few, for rays from the eye and towards lights. `is_clear` tells materials that cast no shadow.
-    pub fn finish(&mut self, eye: DVec3, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
+    pub fn finish(&mut self, eye: Option<DVec3>, lights: &[Light], is_clear: impl Fn(u32) -> bool) {
         self.spheres.sort_by_key(|sphere| is_clear(sphere.material));
         let spheres: Vec<Sphere> = self.spheres.iter().map(|s| s.shape).collect();
         let few = !spheres.is_empty() && spheres.len() <= MOST_LISTED_SPHERES;
         self.list = few.then(|| SphereList::new(&spheres));
-        self.from_eye = few.then(|| Pencil::new(eye, &spheres));
+        self.from_eye = eye.filter(|_| few).map(|eye| Pencil::new(eye, &spheres));
         let blockers = &spheres[..self.spheres.partition_point(|sphere| !is_clear(sphere.material))];
         self.from_lights = lights.iter().map(|light| light.position().filter(|_| few).map(|place| Pencil::new(place, blockers))).collect();
         self.plant(LeafRule::MEASURED);

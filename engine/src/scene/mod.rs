@@ -1,6 +1,7 @@
 //! The compiled scene: all that a frame's rays need, immutable and shared by all threads.
 
 mod compile;
+mod emitters;
 mod error;
 mod forest;
 mod geometry;
@@ -28,9 +29,10 @@ use glam::DVec3;
 
 use crate::{
     camera::Camera,
-    description::{Film, Quality, Render, Rgb},
-    light::Light,
+    description::{Film, Quality, Render},
+    light::{Environment, Light, LightSampler},
     material::Material,
+    sampling::PixelFilter,
     shape::Bounds,
     texture::Texture,
 };
@@ -48,7 +50,11 @@ pub struct Scene {
     /// All textures: those of the description, then those of its models.
     pub textures: Vec<Texture>,
     /// Radiance of rays that leave the scene.
-    pub background: Rgb,
+    pub environment: Environment,
+    /// Chooses among all lights, those that are surfaces included.
+    pub light_sampler: LightSampler,
+    /// Where samples look from within a pixel.
+    pub filter: PixelFilter,
     /// What the frame is gathered on.
     pub film: Film,
     /// How light is followed.

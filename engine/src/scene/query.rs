@@ -287,24 +287,24 @@ impl Scene {
                 let bit = if geometry.list.is_some() { 1 << index } else { 0 };
                 let mut point = sphere.shape.point(ray, hit.t);
                 self.add_sphere_uv(&mut point, sphere.material);
-                Surface { sphere: bit, ..in_world(point, hit.t, sphere.material) }
+                Surface { sphere: bit, ..in_world(point, hit, sphere.material) }
             }
             kind::CUBOID => {
                 let cuboid = &geometry.cuboids[index];
-                in_world(cuboid.shape.point(ray, hit.t, hit.part), hit.t, cuboid.material)
+                in_world(cuboid.shape.point(ray, hit.t, hit.part), hit, cuboid.material)
             }
             kind::DISC => {
                 let disc = &geometry.discs[index];
-                in_world(disc.shape.point(ray, hit.t), hit.t, disc.material)
+                in_world(disc.shape.point(ray, hit.t), hit, disc.material)
             }
             kind::PLANE => {
                 let plane = &geometry.planes[index];
-                in_world(plane.shape.point(ray, hit.t), hit.t, plane.material)
+                in_world(plane.shape.point(ray, hit.t), hit, plane.material)
             }
             kind::OTHER => {
                 let other = &geometry.others[index];
                 let textured = self.is_textured(other.material);
-                in_world(other.shape.point(ray, hit.t, hit.part, textured), hit.t, other.material)
+                in_world(other.shape.point(ray, hit.t, hit.part, textured), hit, other.material)
             }
             kind::TRANSFORMED => self.transformed_surface(ray, hit, index),
             _ => self.mesh_surface(hit, index),
@@ -327,7 +327,7 @@ impl Scene {
         }
         let position = transform.to_world.transform_point3(point.position);
         let error = transform.error(point.error, point.position, position);
-        in_world(Point { position, error, normal: transform.normal(point.normal), uv: point.uv }, hit.t, placed.material)
+        in_world(Point { position, error, normal: transform.normal(point.normal), uv: point.uv }, hit, placed.material)
     }
 
     #[inline(always)]
@@ -348,12 +348,24 @@ impl Scene {
         };
         let uv = if self.is_textured(placed.material) { mesh.uv(&at) } else { DVec2::ZERO };
         let error = transform.error(local.error, local.position, point);
-        Surface { point, t: hit.t, error, ng, ns, uv, color: mesh.color(&at), material: placed.material, sphere: 0 }
+        Surface {
+            point,
+            t: hit.t,
+            error,
+            ng,
+            ns,
+            uv,
+            color: mesh.color(&at),
+            material: placed.material,
+            object: hit.object,
+            part: hit.part,
+            sphere: 0,
+        }
     }
 
     #[inline(always)]
     fn is_textured(&self, material: u32) -> bool {
-        self.materials[material as usize].texture().is_some()
+        self.materials[material as usize].is_textured()
     }
 
     /// Longitude and latitude cost more than the hit itself: only textures ask for them.
@@ -366,7 +378,8 @@ impl Scene {
 }
 
 #[inline(always)]
-fn in_world(point: Point, t: f64, material: u32) -> Surface {
+fn in_world(point: Point, hit: &Hit, material: u32) -> Surface {
     let Point { position, error, normal, uv } = point;
-    Surface { point: position, t, error, ng: normal, ns: normal, uv, color: [1.0; 4], material, sphere: 0 }
+    let Hit { t, object, part, .. } = *hit;
+    Surface { point: position, t, error, ng: normal, ns: normal, uv, color: [1.0; 4], material, object, part, sphere: 0 }
 }

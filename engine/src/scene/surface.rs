@@ -23,6 +23,10 @@ pub struct Surface {
     pub color: [f32; 4],
     /// Index into [`super::Scene::materials`].
     pub material: u32,
+    /// Place of the object in the order of the scene.
+    pub object: u32,
+    /// Triangle of a mesh, face of a box, side or end of a cone; 0 on everything else.
+    pub part: u32,
     /// The bit of a listed sphere, 0 for everything else: see [`Ray::leaves`].
     pub sphere: u64,
 }

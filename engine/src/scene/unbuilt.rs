@@ -26,7 +26,8 @@ impl Unbuilt {
         let transparent = matches!(scene.render, Render::Whitted { transparent_shadows: true, .. });
         let materials = &scene.materials;
         let casts_no_shadow = |material: u32| transparent && materials[material as usize].passes_all_light();
-        scene.geometry.finish(scene.camera.eye(), &scene.lights, casts_no_shadow);
+        let eye = scene.camera.rays_start_at_eye().then(|| scene.camera.eye());
+        scene.geometry.finish(eye, &scene.lights, casts_no_shadow);
         scene.statistics = Statistics::of(&scene.geometry);
         scene
     }

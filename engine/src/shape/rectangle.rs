@@ -47,6 +47,16 @@ impl Rectangle {
         Self { corner: self.corner * scale + by, edges, widths, reach: self.reach * scale, ..*self }
     }
 
+    /// Where both edges begin.
+    pub fn corner(&self) -> DVec3 {
+        self.corner
+    }
+
+    /// u and v.
+    pub fn edges(&self) -> [DVec3; 2] {
+        self.edges
+    }
+
     /// The box around it.
     pub fn bounds(&self) -> Bounds {
         let [u, v] = self.edges;

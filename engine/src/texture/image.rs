@@ -85,7 +85,7 @@ impl Image {
     }
 
     /// The pixel in column `x` and row `y`: linear Rec. 709 and opacity.
-    pub(super) fn pixel(&self, x: u32, y: u32) -> [f32; 4] {
+    pub(crate) fn pixel(&self, x: u32, y: u32) -> [f32; 4] {
         let start = (y as usize * self.width as usize + x as usize) * self.channels;
         let range = start..start + self.channels;
         match &self.samples {

@@ -47,7 +47,7 @@ pub fn run(args: Args) -> Result<()> {
     let pixels = u64::from(width) * u64::from(height);
     let ladder = Ladder { knob: "samples", values: sample_ladder(&scene, args.best), exposure, pixels };
     let mut rungs = ladder.climb(|count, bar| here::frame(&scene, count, |rect| bar.inc(rect.area())))?;
-    if let Render::Whitted { max_depth, .. } = scene.render {
+    if let Render::Whitted { max_depth, .. } | Render::Path { max_depth, .. } = scene.render {
         let whole = scene.render.clone();
         let ladder = Ladder { knob: "max_depth", values: report::ladder(u64::from(max_depth), 2), ..ladder };
         rungs.extend(ladder.climb(|depth, bar| {
@@ -68,23 +68,20 @@ pub fn run(args: Args) -> Result<()> {
     Ok(())
 }
 
-/// Further samples of the filter `point` repeat the first.
+/// Where nothing but the place in the pixel is left to chance, further samples of the filter `point` repeat the first.
 fn sample_ladder(scene: &Scene, best: Option<u64>) -> Vec<u64> {
-    match scene.film.filter {
-        Filter::Point => vec![1],
-        Filter::Box => report::ladder(best.unwrap_or(u64::from(scene.quality.samples).max(64)), 4),
+    if scene.film.filter == Filter::Point && !matches!(scene.render, Render::Path { .. }) {
+        return vec![1];
     }
+    report::ladder(best.unwrap_or(u64::from(scene.quality.samples).max(64)), 4)
 }
 
 fn limited(render: &Render, depth: u64) -> Render {
-    match render {
-        Render::Whitted { transparent_shadows, min_weight, .. } => Render::Whitted {
-            max_depth: u32::try_from(depth).unwrap_or(u32::MAX),
-            transparent_shadows: *transparent_shadows,
-            min_weight: *min_weight,
-        },
-        Render::Raycast => Render::Raycast,
+    let mut limited = render.clone();
+    if let Render::Whitted { max_depth, .. } | Render::Path { max_depth, .. } = &mut limited {
+        *max_depth = u32::try_from(depth).unwrap_or(u32::MAX);
     }
+    limited
 }
 
 /// The settings of one knob, the cheapest first.

@@ -6,7 +6,9 @@ use std::{
 };
 
 use serde::Serialize;
-use tessera_engine::description::{AssetId, Group, GroupId, Material, MaterialId, Object, ObjectKind, Scene, Shape, Texture, TextureId};
+use tessera_engine::description::{
+    AssetId, Environment, Group, GroupId, Material, MaterialId, Object, ObjectKind, Scene, Shape, Texture, TextureId,
+};
 
 use super::handle::{GroupNode, MaterialNode, NodeKind, ObjectNode, SceneNode};
 
@@ -21,7 +23,11 @@ pub fn scene(node: &SceneNode) -> Result<(Scene, BTreeSet<AssetId>), postcard::E
     scene.groups.push(Group { objects });
     scene.root = index(scene.groups.len() - 1);
     scene.lights.clone_from(&node.lights);
-    scene.background = node.background;
+    scene.background.clone_from(&node.background);
+    scene.medium.clone_from(&node.medium);
+    if let Environment::Image { file, .. } = &scene.background {
+        assembly.assets.insert(*file);
+    }
     Ok((scene, assembly.assets))
 }
 
@@ -72,8 +78,12 @@ impl Assembly {
     fn material(&mut self, node: &MaterialNode) -> Result<MaterialId, postcard::Error> {
         let texture_id = node.texture.as_ref().map(|texture| self.texture(texture)).transpose()?;
         let mut material = node.material.clone();
-        if let Material::Diffuse { texture, .. } = &mut material {
-            *texture = texture_id;
+        match &mut material {
+            Material::Diffuse { texture, .. }
+            | Material::RoughDiffuse { texture, .. }
+            | Material::Plastic { texture, .. }
+            | Material::Emitter { texture, .. } => *texture = texture_id,
+            Material::Mirror { .. } | Material::Metal { .. } | Material::Glass { .. } | Material::Boundary { .. } => {}
         }
         intern(&mut self.materials, &mut self.scene.materials, material)
     }

@@ -17,7 +17,7 @@ pub struct Compiled {
 }
 
 /// Stands in for the camera of a job that gives none, until the scene's size is known.
-const ANY: Camera = Camera::Perspective { eye: [0.0, 0.0, 1.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov: 40.0 };
+const ANY: Camera = Camera::Panoramic { eye: [0.0, 0.0, 1.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0] };
 
 /// Compiles the scene of the script `name`, and frames it where the job gives no camera.
 ///

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use glam::DAffine3;
 use mlua::{Function, Lua, MetaMethod, UserData, UserDataMethods, Value};
-use tessera_engine::description::{Camera, Film, Light, Material, Matrix, Model, Quality, Render, Rgb, Shape, SourceId, Texture};
+use tessera_engine::description::{
+    Camera, Environment, Film, Light, Material, Matrix, Medium, Model, Quality, Render, Shape, SourceId, Texture,
+};
 
 use super::{Frames, Output, api::transform, keys::describe, place::Place};
 use crate::schedule::{Assign, Probe, Split};
@@ -23,6 +25,8 @@ pub enum Thing {
     Material(Arc<MaterialNode>),
     Texture(Texture),
     Light(Light),
+    Medium(Medium),
+    Environment(Environment),
     Camera(Camera),
     Render(Render),
     Probe(Probe),
@@ -64,7 +68,8 @@ pub struct MaterialNode {
 pub struct SceneNode {
     pub objects: Vec<Arc<ObjectNode>>,
     pub lights: Vec<Light>,
-    pub background: Rgb,
+    pub background: Environment,
+    pub medium: Option<Medium>,
 }
 
 /// What `tessera.job` was given.

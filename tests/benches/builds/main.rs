@@ -97,7 +97,7 @@ fn scene(encoded: Vec<u8>) -> (MemoryAssets, Frame) {
     let scene = Description { materials: vec![material], groups: vec![Group { objects: vec![object] }], ..Description::default() };
     let frame = Frame {
         scene,
-        camera: Camera::Perspective { eye: [0.0, 0.0, 9.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov: 45.0 },
+        camera: Camera::pinhole([0.0, 0.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0], 45.0),
         film: Film { width: 64, height: 64, filter: Filter::Box },
         render: Render::Raycast,
         quality: Quality { samples: 1 },

@@ -71,7 +71,7 @@ fn picture(change: Change) -> (Frame, MemoryAssets) {
     let instance = Object { kind: ObjectKind::Instance { group: 0 }, transform: Some(matrix(whole)), source };
     scene.groups.push(Group { objects: vec![instance] });
     scene.root = 1;
-    scene.background = lit([0.25, 0.5, 0.75], 1.0);
+    scene.background = Environment::Constant(lit([0.25, 0.5, 0.75], 1.0));
     scene.lights = vec![
         Light::Point {
             position: place(-3.0, 5.0, 4.0),
@@ -80,10 +80,9 @@ fn picture(change: Change) -> (Frame, MemoryAssets) {
             source,
         },
         Light::Point { position: place(4.0, 3.0, 2.0), intensity: lit([0.25, 0.25, 0.5], 1.0), falloff: Falloff::None, source },
-        Light::Directional { direction: [0.25, -1.0, -0.25], irradiance: lit([0.75, 0.75, 0.5], 1.0), source },
+        Light::Directional { direction: [0.25, -1.0, -0.25], irradiance: lit([0.75, 0.75, 0.5], 1.0), angle: 0.0, source },
     ];
-    frame.camera =
-        Camera::Perspective { eye: place(0.5, 3.5, 11.0), look_at: place(0.25, 0.75, 0.0), up: [0.0, 1.0, 0.0], horizontal_fov: 45.0 };
+    frame.camera = Camera::pinhole(place(0.5, 3.5, 11.0), place(0.25, 0.75, 0.0), [0.0, 1.0, 0.0], 45.0);
     frame.film = Film { width: 160, height: 120, filter: Filter::Box };
     frame.quality = Quality { samples: 4 };
     frame.render = Render::Whitted { max_depth: 6, transparent_shadows: true, min_weight: 0.0 };

@@ -29,7 +29,7 @@ pub fn far_camera(rays: u64) -> Tally {
     let (far, half) = (2e6_f64, 1.25);
     let mut frame = frame(world.objects.clone());
     let horizontal_fov = 2.0 * (half / far).atan().to_degrees();
-    frame.camera = Camera::Perspective { eye: (backward * far).into(), look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov };
+    frame.camera = Camera::pinhole((backward * far).into(), [0.0; 3], [0.0, 1.0, 0.0], horizontal_fov);
     (frame.film.width, frame.film.height) = (SIDE as u32, SIDE as u32);
     let scene = Scene::compile(&frame, &world.assets).expect("a scene that can be compiled");
     let right = (-backward).cross(DVec3::Y).normalize();

@@ -58,10 +58,10 @@ impl World {
 pub fn frame(objects: Vec<Object>) -> Frame {
     let diffuse = Material::Diffuse { reflectance: [0.5; 3], texture: None };
     let mirror = Material::Mirror { reflectance: [0.9; 3] };
-    let glass = Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [1.0; 3] };
+    let glass = Material::smooth_glass(1.5, [1.0; 3]);
     Frame {
         scene: Description { materials: vec![diffuse, mirror, glass], groups: vec![Group { objects }], ..Default::default() },
-        camera: Camera::Perspective { eye: [0.0, 3.5, 11.0], look_at: [0.0, 0.8, 0.0], up: [0.0, 1.0, 0.0], horizontal_fov: 45.0 },
+        camera: Camera::pinhole([0.0, 3.5, 11.0], [0.0, 0.8, 0.0], [0.0, 1.0, 0.0], 45.0),
         film: Film { width: 96, height: 72, filter: Filter::Box },
         render: Render::Raycast,
         quality: Quality { samples: 1 },

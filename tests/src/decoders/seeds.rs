@@ -6,8 +6,8 @@ use std::{collections::BTreeMap, fs, time::Duration};
 use serde::Serialize;
 use tessera_engine::{
     description::{
-        AssetId, Camera, ColorSpace, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData, Object, ObjectKind,
-        Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+        AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData, Object,
+        ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     film,
     output::exr,
@@ -233,7 +233,7 @@ fn frame() -> Frame {
     };
     let lights = vec![
         Light::Point { position: [3.0, 4.0, 5.0], intensity: [30.0; 3], falloff: Falloff::InverseSquare, source: SourceId::default() },
-        Light::Directional { direction: [0.0, -1.0, 0.5], irradiance: [1.0; 3], source: SourceId::default() },
+        Light::Directional { direction: [0.0, -1.0, 0.5], irradiance: [1.0; 3], angle: 0.0, source: SourceId::default() },
     ];
     Frame {
         scene: Scene {
@@ -241,15 +241,16 @@ fn frame() -> Frame {
             materials: vec![
                 Material::Diffuse { reflectance: [0.5; 3], texture: Some(0) },
                 Material::Mirror { reflectance: [0.9; 3] },
-                Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [0.9; 3] },
+                Material::smooth_glass(1.5, [0.9; 3]),
                 Material::Diffuse { reflectance: [0.5; 3], texture: Some(1) },
             ],
             groups: vec![Group { objects: inner }, Group { objects: outer }],
             root: 1,
             lights,
-            background: [0.1, 0.2, 0.3],
+            background: Environment::Constant([0.1, 0.2, 0.3]),
+            medium: None,
         },
-        camera: Camera::Perspective { eye: [0.5, 1.0, 6.0], look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov: 40.0 },
+        camera: Camera::pinhole([0.5, 1.0, 6.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0),
         film: Film { width: 16, height: 12, filter: Filter::Box },
         render: Render::Whitted { max_depth: 4, transparent_shadows: true, min_weight: 0.01 },
         quality: Quality { samples: 4 },

@@ -121,7 +121,7 @@ fn films_and_cameras_are_checked() {
     let error = Scene::compile(&empty, &MemoryAssets::default()).unwrap_err();
     assert_eq!(error.message, "the film is 0 x 768 pixels; each side must be 1 to 65536");
     let mut blind = frame(vec![]);
-    blind.camera = Camera::Perspective { eye: [0.0; 3], look_at: [0.0; 3], up: [0.0, 1.0, 0.0], horizontal_fov: 40.0 };
+    blind.camera = Camera::pinhole([0.0; 3], [0.0; 3], [0.0, 1.0, 0.0], 40.0);
     let error = Scene::compile(&blind, &MemoryAssets::default()).unwrap_err();
     assert_eq!(error.message, "the camera's look_at must differ from its eye");
 }

@@ -62,15 +62,11 @@ pub fn frame(objects: Vec<Object>) -> Frame {
     let diffuse = Material::Diffuse { reflectance: [0.5; 3], texture: None };
     Frame {
         scene: Description {
-            materials: vec![
-                diffuse,
-                Material::Mirror { reflectance: [0.9; 3] },
-                Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [1.0; 3] },
-            ],
+            materials: vec![diffuse, Material::Mirror { reflectance: [0.9; 3] }, Material::smooth_glass(1.5, [1.0; 3])],
             groups: vec![Group { objects }],
             ..Default::default()
         },
-        camera: Camera::Perspective { eye: [0.0, 3.5, 11.0], look_at: [0.0, 0.8, 0.0], up: [0.0, 1.0, 0.0], horizontal_fov: 45.0 },
+        camera: Camera::pinhole([0.0, 3.5, 11.0], [0.0, 0.8, 0.0], [0.0, 1.0, 0.0], 45.0),
         film: Film { width: 1024, height: 768, filter: Filter::Point },
         render: Render::Raycast,
         quality: Quality { samples: 1 },

@@ -45,7 +45,7 @@ impl Work for Compare {
 /// Lights outside, within and on spheres, and one without a place.
 fn lights() -> Vec<Light> {
     let point = |position| Light::Point { position, intensity: [1.0; 3], falloff: Falloff::None, source: SourceId::default() };
-    let sun = Light::Directional { direction: [0.3, -1.0, 0.2], irradiance: [1.0; 3], source: SourceId::default() };
+    let sun = Light::Directional { direction: [0.3, -1.0, 0.2], irradiance: [1.0; 3], angle: 0.0, source: SourceId::default() };
     vec![point([-6.0, 9.0, 6.0]), point([-4.5, 1.6, -6.4]), point([1.2, 2.5, 2.5]), point([1.0, 900.0, -2000.0]), sun]
 }
 

@@ -39,6 +39,14 @@ const FILM: &[&str] = &["width", "height", "filter"];
 const QUALITY: &[&str] = &["samples"];
 const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure"];
 
+const FILTERS: &[(&str, Filter)] = &[
+    ("box", Filter::Box),
+    ("point", Filter::Point),
+    ("gaussian", Filter::Gaussian),
+    ("blackman_harris", Filter::BlackmanHarris),
+    ("mitchell", Filter::Mitchell),
+];
+
 const EDGE: u32 = 65_536;
 const EXPOSURE: Range = Range { lowest: -100.0, highest: 100.0, open: false, words: "stops from -100 to 100" };
 const PATIENCE: Range = Range { lowest: 0.0, highest: limits::LONGEST_PATIENCE, open: false, words: "seconds, up to a year of them" };
@@ -51,14 +59,14 @@ fn job(keys: &Keys) -> mlua::Result<Value> {
         _ => None,
     })?;
     let camera = keys.or("camera", None, |field| {
-        of_frame(field, frames.as_ref())?.thing("a camera (tessera.perspective)", |handle| match &handle.thing {
+        of_frame(field, frames.as_ref())?.thing("a camera (tessera.perspective, orthographic or panoramic)", |handle| match &handle.thing {
             Thing::Camera(camera) => Some(Some(camera.clone())),
             _ => None,
         })
     })?;
     let film = film(&keys.required("film")?)?;
     let render = keys.or("render", render::DEFAULT, |field| {
-        field.thing("an integrator (tessera.whitted or tessera.raycast)", |handle| match &handle.thing {
+        field.thing("an integrator (tessera.raycast, whitted or path)", |handle| match &handle.thing {
             Thing::Render(render) => Some(render.clone()),
             _ => None,
         })
@@ -81,7 +89,7 @@ fn film(field: &Field) -> mlua::Result<Film> {
     Ok(Film {
         width: keys.required("width")?.integer32(1, EDGE)?,
         height: keys.required("height")?.integer32(1, EDGE)?,
-        filter: keys.or("filter", Filter::Box, |field| field.choice(&[("box", Filter::Box), ("point", Filter::Point)]))?,
+        filter: keys.or("filter", Filter::Box, |field| field.choice(FILTERS))?,
     })
 }
 

@@ -2,11 +2,13 @@
 
 mod camera;
 mod color;
+mod environment;
 mod group;
 mod frames;
 mod job;
 mod light;
 mod material;
+mod medium;
 mod mesh;
 mod model;
 mod param;
@@ -64,9 +66,11 @@ pub const FUNCTIONS: &[&[Function]] = &[
     group::FUNCTIONS,
     transform::FUNCTIONS,
     material::FUNCTIONS,
+    medium::FUNCTIONS,
     texture::FUNCTIONS,
     color::FUNCTIONS,
     light::FUNCTIONS,
+    environment::FUNCTIONS,
     camera::FUNCTIONS,
     render::FUNCTIONS,
     plan::FUNCTIONS,

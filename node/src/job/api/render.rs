@@ -12,10 +12,14 @@ use crate::job::{
 pub const FUNCTIONS: &[Function] = &[
     Function { path: "raycast", form: Form::Table, keys: &[], make: raycast },
     Function { path: "whitted", form: Form::Table, keys: &["max_depth", "transparent_shadows", "min_weight"], make: whitted },
+    Function { path: "path", form: Form::Table, keys: &["max_depth", "roulette_depth"], make: path },
 ];
 
 /// Deepest ray tree: deeper ones change no pixel, and rays are followed on the stack.
 const DEEPEST: u32 = 64;
+
+/// Longest path: nothing grows with it but time.
+const LONGEST: u32 = 1_000_000;
 
 /// What a job without `render` gets.
 pub const DEFAULT: Render = Render::Whitted { max_depth: 8, transparent_shadows: false, min_weight: 0.0 };
@@ -29,4 +33,10 @@ fn whitted(keys: &Keys) -> mlua::Result<Value> {
     let transparent_shadows = keys.or("transparent_shadows", false, |field| field.boolean())?;
     let min_weight = keys.or("min_weight", 0.0, |field| field.number(UNIT))?;
     keys.make(|_| Thing::Render(Render::Whitted { max_depth, transparent_shadows, min_weight }))
+}
+
+fn path(keys: &Keys) -> mlua::Result<Value> {
+    let max_depth = keys.or("max_depth", 16, |field| field.integer32(1, LONGEST))?;
+    let roulette_depth = keys.or("roulette_depth", 5, |field| field.integer32(1, LONGEST))?;
+    keys.make(|_| Thing::Render(Render::Path { max_depth, roulette_depth }))
 }

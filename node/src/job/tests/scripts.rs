@@ -61,7 +61,7 @@ fn s1_is_the_published_scene() {
                 assert!(reflectance.iter().zip(expected).all(|(got, expected)| (got - expected).abs() < 1e-6), "{i}");
             }
             1 => assert_eq!(*material, Material::Mirror { reflectance: [0.9; 3] }),
-            _ => assert_eq!(*material, Material::Glass { ior: 1.5, reflectance: [1.0; 3], transmittance: [1.0; 3] }),
+            _ => assert_eq!(*material, Material::smooth_glass(1.5, [1.0; 3])),
         }
     }
 }

@@ -63,7 +63,7 @@ local linear = tessera.rgb(0.25, 2, 0)
 assert(linear[1] == 0.25 and linear[2] == 2)
 return tessera.job { scene = tessera.scene { objects = { tessera.sphere { material = grey } }, background = linear }, film = { width = 8, height = 8 } }",
     ));
-    assert_eq!(job.description.frame.scene.background, [0.25, 2.0, 0.0]);
+    assert_eq!(job.description.frame.scene.background, Environment::Constant([0.25, 2.0, 0.0]));
 }
 
 #[test]

@@ -1,0 +1,58 @@
+//! How a surface scatters light at a point, in the world's coordinates.
+
+use glam::{DVec2, DVec3};
+
+use crate::{
+    material::{Bsdf, Material, Scattered},
+    math::orthonormal_basis,
+    scene::{Scene, Surface},
+};
+
+/// A BSDF and the frame that it stands in.
+pub struct Shading<'s> {
+    /// In its own coordinates, where z is the shading normal.
+    pub bsdf: Bsdf<'s>,
+    axes: [DVec3; 3],
+    ng: DVec3,
+    /// Towards the viewer, in the BSDF's coordinates.
+    wo: DVec3,
+    /// Whether the viewer is on the outward side.
+    outside: bool,
+}
+
+impl<'s> Shading<'s> {
+    /// At the end of a ray along `direction`; `None` if the surface does not scatter light.
+    #[inline(always)]
+    pub fn new(scene: &'s Scene, material: &'s Material, surface: &Surface, direction: DVec3) -> Option<Self> {
+        let bsdf = material.bsdf(&scene.textures, surface)?;
+        let outside = direction.dot(surface.ng) < 0.0;
+        // A shading normal that looks away from the viewer tells nothing about what is seen.
+        let z = if (direction.dot(surface.ns) < 0.0) == outside { surface.ns } else { surface.ng };
+        let (x, y) = orthonormal_basis(z);
+        let axes = [x, y, z];
+        let wo = -DVec3::new(x.dot(direction), y.dot(direction), z.dot(direction));
+        Some(Self { bsdf, axes, ng: surface.ng, wo, outside })
+    }
+
+    /// `f |cos|` for light from a direction, and the density with which [`Self::sample`] chooses it.
+    #[inline(always)]
+    pub fn evaluate(&self, direction: DVec3) -> (DVec3, f64) {
+        let [x, y, z] = self.axes;
+        let wi = DVec3::new(x.dot(direction), y.dot(direction), z.dot(direction));
+        // Light must come from the same side by both normals, or it leaks through the surface (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 5.3).
+        if (wi.z > 0.0) != (direction.dot(self.ng) > 0.0) {
+            return (DVec3::ZERO, 0.0);
+        }
+        self.bsdf.evaluate(self.wo, wi)
+    }
+
+    /// A direction in which the path goes on.
+    #[inline(always)]
+    pub fn sample(&self, pick: f64, u: DVec2) -> Option<(Scattered, DVec3)> {
+        let scattered = self.bsdf.sample(self.wo, pick, u)?;
+        let [x, y, z] = self.axes;
+        let direction = x * scattered.wi.x + y * scattered.wi.y + z * scattered.wi.z;
+        let to_outside = direction.dot(self.ng) > 0.0;
+        ((to_outside == self.outside) != scattered.transmitted).then_some((scattered, direction))
+    }
+}
