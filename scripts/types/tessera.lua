@@ -11,6 +11,8 @@
 ---@class tessera.Group: tessera.Object
 ---@class tessera.Material
 ---@class tessera.Texture
+---@class tessera.Medium
+---@class tessera.Environment
 ---@class tessera.Light
 ---@class tessera.Camera
 ---@class tessera.Integrator
@@ -60,7 +62,7 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@class tessera.Film
 ---@field width number columns
 ---@field height number rows; the first is the top
----@field filter? "box"|"point" what a pixel averages: its square evenly, or its middle alone
+---@field filter? "box"|"point"|"gaussian"|"blackman_harris"|"mitchell" what a pixel averages
 
 -- @api job: quality
 ---@class tessera.Quality
@@ -105,8 +107,9 @@ function tessera.job(keys) end
 -- @api scene
 ---@class tessera.SceneKeys
 ---@field objects (tessera.Object|tessera.Object[])[] shapes, models, groups, instances; lists within lists are taken in place
----@field lights? (tessera.Light|tessera.Light[])[] lights, in world coordinates
----@field background? tessera.Color radiance of rays that leave the scene
+---@field lights? (tessera.Light|tessera.Light[])[] lights without extent, in world coordinates
+---@field background? tessera.Color|tessera.Environment radiance of rays that leave the scene; it lights the scene with path alone
+---@field medium? tessera.Medium what fills space outside of everything, for path: fog
 ---@field name? string for messages
 
 ---@param keys tessera.SceneKeys
@@ -298,10 +301,11 @@ function tessera.matrix(rows) end
 
 -- @api diffuse
 ---@class tessera.DiffuseKeys
----@field reflectance? tessera.Color|tessera.Texture the share of light that is reflected
+---@field reflectance? tessera.Color|tessera.Texture the share of light that is reflected: the albedo
+---@field roughness? number 0 is Lambertian
 ---@field name? string for messages
 
----Lambertian reflection, on both sides.
+---Lambertian reflection, on both sides; with a roughness, that of a rough matte surface such as clay, which keeps its energy (an Oren-Nayar model). Radiance towards the eye is reflectance / pi times irradiance.
 ---@param keys? tessera.DiffuseKeys
 ---@return tessera.Material
 function tessera.diffuse(keys) end
@@ -311,22 +315,87 @@ function tessera.diffuse(keys) end
 ---@field reflectance? tessera.Color the share of light that is reflected
 ---@field name? string for messages
 
----Perfect specular reflection, on both sides, alike at every angle.
+---Perfect specular reflection, on both sides, alike at every angle: no Fresnel.
 ---@param keys? tessera.MirrorKeys
 ---@return tessera.Material
 function tessera.mirror(keys) end
 
--- @api glass
----@class tessera.GlassKeys
----@field ior? number index of refraction of the inside, relative to the outside
----@field reflectance? tessera.Color multiplies what is reflected
----@field transmittance? tessera.Color multiplies what is refracted, once at every surface
+-- @api metal
+---@class tessera.MetalKeys
+---@field metal? string one whose measured index of refraction is known
+---@field eta? tessera.Color real part of the index of refraction, for red, green and blue
+---@field k? tessera.Color its imaginary part, the absorption
+---@field reflectance? tessera.Color what is reflected straight on
+---@field fresnel? "schlick"|"constant" how reflectance changes with the angle: up to white at grazing angles (Schlick's approximation), or not at all
+---@field roughness? number|number[] perceptual roughness; 0 is smooth. Two: along u and across it
+---@field multiple_scattering? boolean whether light that facets reflect to each other is kept; false loses energy at high roughness, as many programs do
 ---@field name? string for messages
 
----A smooth dielectric: reflects and refracts by Fresnel's equations. Its shape should be closed; the normal points out of the glass.
+---A metal, smooth or rough, on both sides: microfacets of the distribution GGX (Trowbridge-Reitz), Smith's height-correlated shadowing. Its alpha is the square of roughness, as in glTF and Blender. Give one of: metal; eta and k; reflectance, perhaps with fresnel.
+---@param keys? tessera.MetalKeys
+---@return tessera.Material
+function tessera.metal(keys) end
+
+-- @api glass
+---@class tessera.GlassKeys
+---@field ior? number index of refraction of the inside, relative to vacuum
+---@field roughness? number perceptual roughness of its surface, for path; 0 is smooth
+---@field reflectance? tessera.Color multiplies what is reflected
+---@field transmittance? tessera.Color multiplies what is refracted, once at every surface
+---@field interior? tessera.Medium what fills it, for path: colours it by thickness
+---@field priority? number where closed objects of glass overlap, the one of highest priority is there and the borders of the others do not show (give a glass a higher one than the water that reaches a little into it); of equal ones, that which the ray entered last
+---@field multiple_scattering? boolean as for metals
+---@field name? string for messages
+
+---A dielectric: reflects and refracts by Fresnel's equations. Its shape should be closed; the normal points out of the glass. It blocks the straight way to lights: behind it, light is found by chance (caustics), except where whitted has transparent_shadows.
 ---@param keys? tessera.GlassKeys
 ---@return tessera.Material
 function tessera.glass(keys) end
+
+-- @api plastic
+---@class tessera.PlasticKeys
+---@field reflectance? tessera.Color|tessera.Texture albedo of the base
+---@field ior? number index of refraction of the coat
+---@field roughness? number perceptual roughness of the coat; 0 is smooth
+---@field name? string for messages
+
+---A smooth or rough clear coat over a Lambertian base, on both sides: paint, varnished wood, glazed clay. Light that the coat reflects back to the base is kept.
+---@param keys? tessera.PlasticKeys
+---@return tessera.Material
+function tessera.plastic(keys) end
+
+-- @api emitter
+---@class tessera.EmitterKeys
+---@field radiance tessera.Color|tessera.Texture power per area and steradian: a surface that fills a pixel shows this number
+---@field two_sided? boolean whether the other side shines too
+---@field name? string for messages
+
+---Shines, the same in all directions, and reflects nothing. Every shape may have it; path sends rays to spheres, discs, rectangles, boxes and meshes of it, and finds others by chance. It shines on the side that the normal points to: out of closed shapes, and of a rectangle on the side from which edge_v is counter-clockwise from edge_u (along edge_u x edge_v).
+---@param keys tessera.EmitterKeys
+---@return tessera.Material
+function tessera.emitter(keys) end
+
+-- @api boundary
+---@class tessera.BoundaryKeys
+---@field interior tessera.Medium what fills it
+---@field name? string for messages
+
+---The invisible border of a medium, for path: smoke in a box. Its shape should be closed.
+---@param keys tessera.BoundaryKeys
+---@return tessera.Material
+function tessera.boundary(keys) end
+
+-- @api medium
+---@class tessera.MediumKeys
+---@field absorption? tessera.Color what is lost
+---@field scattering? tessera.Color what goes on in other directions
+---@field anisotropy? number mean cosine of the angle of scattering (Henyey-Greenstein): above 0 forwards, below 0 backwards
+---@field name? string for messages
+
+---What fills space, for path: absorbs and scatters light evenly along its way. Coefficients are per scene unit: after a length d, exp(-(absorption + scattering) d) of the light is left on its way. For clear coloured glass that shows colour c at thickness d, absorption = -ln(c) / d.
+---@param keys? tessera.MediumKeys
+---@return tessera.Medium
+function tessera.medium(keys) end
 
 -- @api checker
 ---@class tessera.CheckerKeys
@@ -386,11 +455,53 @@ function tessera.point(keys) end
 ---@class tessera.DirectionalKeys
 ---@field direction tessera.Vec3 the direction in which the light travels; any length
 ---@field irradiance tessera.Color on a surface that faces it; a white diffuse one shows radiance irradiance / pi
+---@field angle? number full angle across which it is spread evenly, for path: soft shadows, and a disc that is seen; the sun's is 0.533
 ---@field name? string for messages
 
 ---@param keys tessera.DirectionalKeys
 ---@return tessera.Light
 function tessera.directional(keys) end
+
+-- @api spot
+---@class tessera.SpotKeys
+---@field position tessera.Vec3 where it is, in the world
+---@field direction? tessera.Vec3 the middle of the cone; any length
+---@field look_at? tessera.Vec3 a point in the middle of the cone
+---@field intensity tessera.Color power per steradian inside of the inner cone, as for tessera.point
+---@field outer? number angle between the middle and where it is dark: half of what a lamp's data sheet may call its angle
+---@field inner? number angle between the middle and where it begins to weaken, smoothly
+---@field name? string for messages
+
+---A point light that shines into a cone. Give direction or look_at.
+---@param keys tessera.SpotKeys
+---@return tessera.Light
+function tessera.spot(keys) end
+
+-- @api environment
+---@class tessera.EnvironmentKeys
+---@field file string .hdr (Radiance, linear), .png or .jpg (sRGB)
+---@field scale? tessera.Color multiplies its radiance
+---@field rotation? number turns it about +y, counter-clockwise seen from above
+---@field name? string for messages
+
+---A picture of the surroundings, in latitude and longitude: its middle column lies in the direction -z, right of it +x (a quarter of the width), its first row in +y. With path it lights the scene; rays are sent to its bright places.
+---@param keys tessera.EnvironmentKeys
+---@return tessera.Environment
+function tessera.environment(keys) end
+
+-- @api sky
+---@class tessera.SkyKeys
+---@field sun? tessera.Vec3 towards the sun; any length. Below the horizon: dusk
+---@field turbidity? number haze: 2 is very clear, 3 usual, 10 hazy
+---@field ground? tessera.Color albedo of the ground that is seen below the horizon
+---@field scale? number multiplies all radiance
+---@field disc? boolean whether the sun itself is there; false: the sky alone
+---@field name? string for messages
+
+---A clear sky over a grey ground, with the sun's disc, from the physics of air and haze. Unit: a white diffuse surface that faces the sun outside of the atmosphere would show radiance 1; in the sun it shows about 0.8 (1 unit is 433 W/(m² sr)). +y is up.
+---@param keys? tessera.SkyKeys
+---@return tessera.Environment
+function tessera.sky(keys) end
 
 -- @api perspective
 ---@class tessera.PerspectiveKeys
@@ -398,12 +509,39 @@ function tessera.directional(keys) end
 ---@field look_at? tessera.Vec3 what falls on the middle of the film; differs from eye
 ---@field up? tessera.Vec3 what is upright on the film; not parallel to the view
 ---@field fov? number full **horizontal** field of view
+---@field lens_radius? number radius of the lens's opening in scene units; 0 is a pinhole, for which everything is sharp
+---@field focus_distance? number along the axis of view, to the plane that is sharp
 ---@field name? string for messages
 
----An ideal pinhole with square pixels.
+---A pinhole, or a thin lens that is sharp at one distance, with square pixels.
 ---@param keys tessera.PerspectiveKeys
 ---@return tessera.Camera
 function tessera.perspective(keys) end
+
+-- @api orthographic
+---@class tessera.OrthographicKeys
+---@field eye tessera.Vec3 the middle of the film
+---@field look_at? tessera.Vec3 what falls on the middle of the film; differs from eye
+---@field up? tessera.Vec3 what is upright on the film; not parallel to the view
+---@field width number scene units that the film is wide
+---@field name? string for messages
+
+---Parallel rays with square pixels. The film stands in the world at eye: what lies behind it is not seen.
+---@param keys tessera.OrthographicKeys
+---@return tessera.Camera
+function tessera.orthographic(keys) end
+
+-- @api panoramic
+---@class tessera.PanoramicKeys
+---@field eye tessera.Vec3 where it stands
+---@field look_at? tessera.Vec3 what falls on the middle of the film; differs from eye
+---@field up? tessera.Vec3 what is upright; not parallel to the view
+---@field name? string for messages
+
+---Everything around a point by longitude and latitude: the film is 360 degrees wide and 180 high, so pixels are square on a film twice as wide as high.
+---@param keys tessera.PanoramicKeys
+---@return tessera.Camera
+function tessera.panoramic(keys) end
 
 -- @api raycast
 ---@class tessera.RaycastKeys
@@ -423,6 +561,16 @@ function tessera.raycast(keys) end
 ---@param keys? tessera.WhittedKeys
 ---@return tessera.Integrator
 function tessera.whitted(keys) end
+
+-- @api path
+---@class tessera.PathKeys
+---@field max_depth? number longest chain of rays, the camera's included: 1 shows only what shines, 2 adds light straight from lights. What longer ones would bring is left out
+---@field roulette_depth? number chains at least this long are ended by chance where they carry little, which leaves the mean as it is; max_depth for never
+
+---Path tracing: all light, whatever way it took, with noise that falls with the number of samples and no other error. raycast and whitted show the nearest of diffuse, mirror and clear glass of each material, the light of tessera.point, spot and directional, and what shines as it is; the rest of this page is for path.
+---@param keys? tessera.PathKeys
+---@return tessera.Integrator
+function tessera.path(keys) end
 
 -- @api probe.every_node
 ---@class tessera.ProbeEveryNodeKeys

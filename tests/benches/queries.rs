@@ -69,7 +69,7 @@ fn rays(scene: &Scene) -> Rays {
         (state >> 11) as f64 / (1u64 << 53) as f64 * 2.0 - 1.0
     };
     for pixel in 0..WIDTH * HEIGHT {
-        let ray = scene.camera.ray(f64::from(pixel % WIDTH) + 0.5, f64::from(pixel / WIDTH) + 0.5);
+        let ray = scene.camera.ray(f64::from(pixel % WIDTH) + 0.5, f64::from(pixel / WIDTH) + 0.5, glam::DVec2::ZERO);
         rays.camera.push(ray);
         let Some(surface) = scene.closest(&ray) else { continue };
         let towards = light - surface.point;

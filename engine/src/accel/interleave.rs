@@ -109,8 +109,7 @@ impl<V: Visitor> Stream<'_, V> {
         unsafe {
             let node = self.nodes.get_unchecked(walker.current as usize);
             let ray = block.rays.get_unchecked(walker.ray);
-            let [origin, inverse_near, inverse_far] =
-                [ray.origin, ray.inverse_near, ray.inverse_far].map(|[x, y, z, _]| [L::splat(x), L::splat(y), L::splat(z)]);
+            let (origin, inverse_near, inverse_far) = (L::splats(&ray.origin), L::splats(&ray.inverse_near), L::splats(&ray.inverse_far));
             let limit = L::splat(block.limit_of(walker.ray));
             let (enter, leave) = node.meet(walker.near, [origin, inverse_near], [origin, inverse_far], limit);
             let met = R::of(enter, leave);

@@ -157,8 +157,8 @@ impl<V: Visitor> Stream<'_, V> {
         let mut current = self.root;
         // SAFETY: all are nodes and leaves of this tree, which is never deeper than `MAX_DEPTH`.
         unsafe {
-            let near_ray = packet.near_ray.map(|[x, y, z]| [L::splat(x), L::splat(y), L::splat(z)]);
-            let far_ray = packet.far_ray.map(|[x, y, z]| [L::splat(x), L::splat(y), L::splat(z)]);
+            let near_ray = [L::splats(&packet.near_ray[0]), L::splats(&packet.near_ray[1])];
+            let far_ray = [L::splats(&packet.far_ray[0]), L::splats(&packet.far_ray[1])];
             while limit >= 0.0 {
                 let (enter, leave) = self.nodes.get_unchecked(current as usize).meet(packet.near, near_ray, far_ray, L::splat(limit));
                 let met = R::of(enter, leave);

@@ -27,6 +27,12 @@ impl Simd {
 pub(crate) trait Lanes: Copy {
     unsafe fn load(from: &[f32; 8]) -> Self;
     unsafe fn splat(x: f32) -> Self;
+    /// Each of the first three in all lanes. Not by `array::map`, whose own code may be compiled without the instructions of the type.
+    #[inline(always)]
+    unsafe fn splats<const N: usize>(v: &[f32; N]) -> [Self; 3] {
+        // SAFETY: by this function's own condition.
+        unsafe { [Self::splat(v[0]), Self::splat(v[1]), Self::splat(v[2])] }
+    }
     unsafe fn store(self, to: &mut [f32; 8]);
     unsafe fn add(self, o: Self) -> Self;
     unsafe fn sub(self, o: Self) -> Self;

@@ -32,8 +32,7 @@ pub unsafe fn traverse<L: Lanes, const ANY: bool>(
     }
     // SAFETY: by this function's own conditions.
     unsafe {
-        let [origin, inverse_near, inverse_far] =
-            [ray.origin, ray.inverse_near, ray.inverse_far].map(|[x, y, z, _]| [L::splat(x), L::splat(y), L::splat(z)]);
+        let (origin, inverse_near, inverse_far) = (L::splats(&ray.origin), L::splats(&ray.inverse_near), L::splats(&ray.inverse_far));
         let near = near_bounds(ray.negative);
         let mut stack = MaybeUninit::<[u64; STACK]>::uninit();
         let stack = stack.as_mut_ptr().cast::<u64>();

@@ -1,6 +1,7 @@
 //! Integrators: how much light comes along a ray.
 
 mod direct;
+mod found;
 mod path;
 mod raycast;
 mod shading;

@@ -2,21 +2,22 @@
 
 use glam::DVec3;
 
-use super::{Integrator, RayCounts, rgb, shading::Shading};
+use super::{Integrator, RayCounts, found, shading::Shading};
 use crate::{
     light::{Arriving, Vertex},
-    material::{Emission, Scattered},
+    material::{Bsdf, Material, Medium, Recipe, Scattered, Travel},
     sampling::Sampler,
-    scene::{Surface, Tracer},
+    scene::{Inside, Surface, Tracer},
     shape::Ray,
 };
 
-/// Unidirectional path tracing with next-event estimation (Kajiya, "The Rendering Equation", 1986; Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 13.4): at
+/// Unidirectional path tracing with next-event estimation (Kajiya, "The Rendering Equation", 1986; Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 13.4 and 14.2): at
 /// every vertex one ray goes to a light that stands somewhere, one to a light infinitely far away, where there are such, and one goes on as the material scatters. What both
-/// kinds of rays find is weighted by the power heuristic (Veach, "Robust Monte Carlo Methods for Light Transport Simulation", 1997, 9.2). Chains of little weight end by chance (Arvo and
-/// Kirk, "Particle Transport and Image Synthesis", 1990).
+/// kinds of rays find is weighted by the power heuristic. Chains of little weight end by chance (Arvo and Kirk, "Particle Transport and Image Synthesis", 1990).
+///
+/// `MEDIA` says whether something fills space anywhere, or has a border that cannot be seen.
 #[derive(Debug)]
-pub struct Path {
+pub struct Path<const MEDIA: bool> {
     max_depth: u32,
     roulette_depth: u32,
     counts: RayCounts,
@@ -31,73 +32,84 @@ mod set {
     pub const LOBE: u32 = 4;
     pub const SCATTER: u32 = 5;
     pub const ROULETTE: u32 = 6;
+    pub const TRAVEL: u32 = 7;
     /// Sets of one vertex.
     pub const COUNT: u32 = 8;
 }
 
-/// The vertex that a ray comes from, and the density by solid angle with which it was sent: what lights need to know that could have been chosen there instead.
-#[derive(Clone, Copy)]
-struct Last {
-    vertex: Vertex,
-    pdf: f64,
+/// Surfaces without effect that a ray goes through before it is given up: objects that touch everywhere would hold it forever.
+const MOST_PASSED: u32 = 10_000;
+
+/// A path as far as it is known.
+struct Walk {
+    ray: Ray,
+    /// Rays so far.
+    depth: u32,
+    /// What the radiance along the ray is multiplied by in the pixel.
+    throughput: DVec3,
+    /// Radiance is compressed where light is slow, but what ends by chance must not depend on it.
+    compression: f64,
+    /// Where the ray was sent from, and with which density.
+    last: Option<found::Last>,
+    /// What the ray is inside of.
+    inside: Inside,
 }
 
-impl Path {
+/// What becomes of a path where it meets a surface.
+enum Next {
+    /// It goes on.
+    Along(Scattered, DVec3, Vertex),
+    /// As if nothing were there.
+    Passes,
+    /// It ends.
+    Ends,
+}
+
+impl<const MEDIA: bool> Path<MEDIA> {
     /// With the settings of [`crate::description::Render::Path`].
     pub fn new(max_depth: u32, roulette_depth: u32) -> Self {
         Self { max_depth, roulette_depth, counts: RayCounts::default() }
     }
 }
 
-impl Integrator for Path {
+impl<const MEDIA: bool> Integrator for Path<MEDIA> {
     #[inline(always)]
     fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3 {
-        let (mut radiance, mut throughput) = (DVec3::ZERO, DVec3::ONE);
-        // Radiance is compressed inside of what is dense, but what ends there by chance must not depend on it.
-        let mut compression = 1.0;
-        let mut last: Option<Last> = None;
-        let mut ray = *ray;
-        for depth in 1..=self.max_depth {
-            let met = if depth == 1 { scene.closest_from_eye(&ray) } else { scene.closest(&ray) };
-            let Some(surface) = met else {
-                radiance += throughput * leaving(scene, ray.direction, last.as_ref());
-                break;
-            };
-            let material = &scene.materials[surface.material as usize];
-            if let Some(emission) = &material.emission {
-                radiance += throughput * shining(scene, &surface, emission, ray.direction, last.as_ref());
-            }
-            if depth == self.max_depth {
-                break;
-            }
-            let Some(shading) = Shading::new(&scene, material, &surface, ray.direction) else { break };
-            let sets = Sampler::FIRST_FREE + (depth - 1) * set::COUNT;
-            let vertex = Vertex { point: surface.point, normal: Some(surface.ng) };
-            if !shading.bsdf.is_specular() {
-                radiance += throughput * self.direct(scene, &surface, &shading, &vertex, sampler, sets);
-            }
-            let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
-            let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { break };
-            let Scattered { weight, pdf, specular, eta2, .. } = scattered;
-            throughput *= weight;
-            compression *= eta2;
-            if depth >= self.roulette_depth {
-                let survival = (throughput * compression).max_element();
-                if survival < 1.0 {
-                    if sampler.one(sets + set::ROULETTE) >= survival {
-                        break;
+        let mut radiance = DVec3::ZERO;
+        let mut walk = Walk { ray: *ray, depth: 1, throughput: DVec3::ONE, compression: 1.0, last: None, inside: scene.around_eye };
+        let mut passed = 0;
+        loop {
+            let met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
+            let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
+            let next = match self.scattered_on_the_way(scene, &mut walk, met.as_ref(), sampler, sets, &mut radiance) {
+                Some(next) => next,
+                None => match &met {
+                    None => {
+                        radiance += walk.throughput * found::leaving(scene, walk.ray.direction, walk.last.as_ref());
+                        Next::Ends
                     }
-                    throughput *= 1.0 / survival;
+                    Some(surface) => self.meet(scene, surface, &mut walk, sampler, sets, &mut radiance),
+                },
+            };
+            match (next, &met) {
+                (Next::Along(scattered, direction, vertex), _) => {
+                    if !self.goes_on(&mut walk, &scattered, vertex, sampler, sets) {
+                        return radiance;
+                    }
+                    walk.ray = match (&met, vertex.normal) {
+                        (Some(surface), Some(_)) => surface.spawn(direction),
+                        _ => Ray::new(vertex.point, direction),
+                    };
                 }
+                (Next::Passes, Some(surface)) if passed < MOST_PASSED => {
+                    passed += 1;
+                    walk.inside.cross(surface, walk.ray.direction);
+                    walk.ray = surface.spawn(walk.ray.direction);
+                    walk.last.iter_mut().for_each(|last| last.distance += surface.t);
+                }
+                _ => return radiance,
             }
-            if throughput == DVec3::ZERO {
-                break;
-            }
-            last = (!specular).then_some(Last { vertex, pdf });
-            ray = surface.spawn(direction);
-            self.counts.secondary += 1;
         }
-        radiance
     }
 
     fn counts(&self) -> RayCounts {
@@ -105,110 +117,183 @@ impl Integrator for Path {
     }
 }
 
-impl Path {
-    /// Light that comes straight from lights and is scattered once.
+impl<const MEDIA: bool> Path<MEDIA> {
+    /// Adds what a surface shows by itself and what it scatters once, and chooses where the path goes on.
     #[inline(always)]
-    fn direct(&mut self, scene: impl Tracer, surface: &Surface, shading: &Shading, vertex: &Vertex, sampler: &Sampler, sets: u32) -> DVec3 {
+    fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sampler: &Sampler, sets: u32, radiance: &mut DVec3) -> Next {
+        let material = &scene.materials[surface.material as usize];
+        let direction = walk.ray.direction;
+        if let Some(emission) = &material.emission {
+            *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref());
+        }
+        let Some(bsdf) = bsdf(scene, material, surface, &walk.inside) else { return Next::Passes };
+        if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
+            return Next::Ends;
+        }
+        let shading = Shading::new(bsdf, surface, direction);
+        let vertex = Vertex { point: surface.point, normal: Some(surface.ng) };
+        if !shading.bsdf.is_specular() {
+            let evaluate = |direction| shading.evaluate(direction);
+            *radiance += walk.throughput * self.direct(scene, Some(surface), walk, &vertex, sampler, sets, evaluate);
+        }
+        let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
+        let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
+        if scattered.transmitted && material.recipe.has_inside() {
+            walk.inside.cross(surface, direction);
+        }
+        Next::Along(scattered, direction, vertex)
+    }
+
+    /// Lets light be weakened, and perhaps scattered, on the way to the next surface.
+    #[inline(always)]
+    fn scattered_on_the_way(
+        &mut self,
+        scene: impl Tracer,
+        walk: &mut Walk,
+        met: Option<&Surface>,
+        sampler: &Sampler,
+        sets: u32,
+        radiance: &mut DVec3,
+    ) -> Option<Next> {
+        if !MEDIA {
+            return None;
+        }
+        let medium = walk.inside.medium(&scene)?;
+        let distance = met.map_or(f64::INFINITY, |surface| surface.t);
+        let u = if medium.scatters() { sampler.pair(sets + set::TRAVEL) } else { glam::DVec2::ZERO };
+        match medium.travel(distance, u) {
+            Travel::Arrives(weight) => {
+                walk.throughput *= weight;
+                (walk.throughput == DVec3::ZERO).then_some(Next::Ends)
+            }
+            Travel::Scatters(way, weight) => {
+                walk.throughput *= weight;
+                if walk.depth == self.max_depth {
+                    return Some(Next::Ends);
+                }
+                Some(self.scatter_in(scene, medium, walk, walk.ray.at(way), sampler, sets, radiance))
+            }
+        }
+    }
+
+    /// A vertex within a medium.
+    #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
+    fn scatter_in(
+        &mut self,
+        scene: impl Tracer,
+        medium: &Medium,
+        walk: &Walk,
+        point: DVec3,
+        sampler: &Sampler,
+        sets: u32,
+        radiance: &mut DVec3,
+    ) -> Next {
+        let vertex = Vertex { point, normal: None };
+        let along = walk.ray.direction;
+        let evaluate = |direction: DVec3| {
+            let pdf = medium.phase(along.dot(direction));
+            (DVec3::splat(pdf), pdf)
+        };
+        *radiance += walk.throughput * self.direct(scene, None, walk, &vertex, sampler, sets, evaluate);
+        let (direction, pdf) = medium.scatter(along, sampler.pair(sets + set::SCATTER));
+        Next::Along(Scattered { transmitted: true, ..Scattered::reflected(direction, DVec3::ONE, pdf) }, direction, vertex)
+    }
+
+    /// Makes a path one ray longer, unless chance or a weight of 0 ends it.
+    #[inline(always)]
+    fn goes_on(&mut self, walk: &mut Walk, scattered: &Scattered, vertex: Vertex, sampler: &Sampler, sets: u32) -> bool {
+        let Scattered { weight, pdf, specular, eta2, .. } = *scattered;
+        walk.throughput *= weight;
+        walk.compression *= eta2;
+        if walk.depth >= self.roulette_depth {
+            let survival = (walk.throughput * walk.compression).max_element();
+            if survival < 1.0 {
+                if sampler.one(sets + set::ROULETTE) >= survival {
+                    return false;
+                }
+                walk.throughput *= 1.0 / survival;
+            }
+        }
+        walk.last = (!specular).then_some(found::Last { vertex, pdf, distance: 0.0 });
+        walk.depth += 1;
+        self.counts.secondary += 1;
+        walk.throughput != DVec3::ZERO
+    }
+
+    /// Light that comes straight from lights and is scattered once, as `evaluate` says.
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
+    fn direct(
+        &mut self,
+        scene: impl Tracer,
+        surface: Option<&Surface>,
+        walk: &Walk,
+        vertex: &Vertex,
+        sampler: &Sampler,
+        sets: u32,
+        evaluate: impl Fn(DVec3) -> (DVec3, f64),
+    ) -> DVec3 {
         let lights = &scene.light_sampler;
         let mut radiance = DVec3::ZERO;
         if lights.has_local() {
             let pick = if lights.picks_local() { sampler.one(sets + set::LIGHT) } else { 0.0 };
             if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, sampler.pair(sets + set::PLACE)) {
-                radiance += self.scattered(scene, surface, shading, &arriving);
+                radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
         if lights.has_distant() {
             let (pick, u) = (sampler.one(sets + set::DISTANT), sampler.pair(sets + set::DIRECTION));
             if let Some(arriving) = lights.sample_distant(&scene.lights, &scene.environment, vertex, pick, u) {
-                radiance += self.scattered(scene, surface, shading, &arriving);
+                radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
         radiance
     }
 
-    /// What the surface passes on of light that arrives, if nothing stands between.
+    /// What is passed on of light that arrives, if nothing stands between.
     #[inline(always)]
-    fn scattered(&mut self, scene: impl Tracer, surface: &Surface, shading: &Shading, arriving: &Arriving) -> DVec3 {
-        let (f, pdf) = shading.evaluate(arriving.direction);
+    fn scattered(
+        &mut self,
+        scene: impl Tracer,
+        surface: Option<&Surface>,
+        walk: &Walk,
+        vertex: &Vertex,
+        arriving: &Arriving,
+        evaluate: &impl Fn(DVec3) -> (DVec3, f64),
+    ) -> DVec3 {
+        let (f, pdf) = evaluate(arriving.direction);
         if f == DVec3::ZERO {
             return DVec3::ZERO;
         }
-        let weight = arriving.pdf.map_or(1.0, |of_light| power_heuristic(of_light, pdf));
-        let side = arriving.direction.dot(surface.ng);
-        let (origin, leaves) = (surface.start(side), surface.leaves(side));
-        let ray = Ray { origin, direction: arriving.direction, t_max: arriving.distance, leaves };
-        self.counts.shadow += 1;
-        let light = match arriving.textured {
-            Some(emitter) => arriving.light * looked_up(scene, emitter, &ray),
-            None => {
-                let blocked = match arriving.delta {
-                    Some(light) => scene.any_before_light(light as usize, &ray, |_, _| true),
-                    None => scene.any(&ray, |_, _| true),
-                };
-                if blocked { DVec3::ZERO } else { arriving.light }
+        let weight = arriving.pdf.map_or(1.0, |of_light| found::power_heuristic(of_light, pdf));
+        let ray = match surface {
+            Some(surface) => {
+                let side = arriving.direction.dot(surface.ng);
+                Ray { t_max: arriving.distance, leaves: surface.leaves(side), ..Ray::new(surface.start(side), arriving.direction) }
             }
+            None => Ray { t_max: arriving.distance, ..Ray::new(vertex.point, arriving.direction) },
         };
-        f * light * weight
-    }
-}
-
-/// Radiance of an emitter that a ray is sent to, if nothing stands before it.
-#[inline(never)]
-fn looked_up(scene: impl Tracer, emitter: u32, ray: &Ray) -> DVec3 {
-    let emitter = &scene.light_sampler.emitters[emitter as usize];
-    let Some(surface) = scene.closest(&Ray { t_max: f64::INFINITY, ..*ray }) else { return DVec3::ZERO };
-    if (surface.object, surface.part) != (emitter.object, emitter.part) {
-        return DVec3::ZERO;
-    }
-    let emission = &scene.materials[surface.material as usize].emission;
-    emission.as_ref().map_or(DVec3::ZERO, |emission| emitted(scene, &surface, emission, ray.direction))
-}
-
-/// Radiance that a surface sends against a ray by itself.
-#[inline(always)]
-fn emitted(scene: impl Tracer, surface: &Surface, emission: &Emission, direction: DVec3) -> DVec3 {
-    if !emission.two_sided && direction.dot(surface.ng) >= 0.0 {
-        return DVec3::ZERO;
-    }
-    match emission.texture {
-        Some(texture) => {
-            let [r, g, b, _] = scene.textures[texture as usize].rgba(surface.uv);
-            emission.radiance * rgb([r, g, b])
+        self.counts.shadow += 1;
+        let mut inside = walk.inside;
+        if let Some(surface) = surface.filter(|surface| MEDIA && goes_through(scene, surface, walk.ray.direction, ray.direction)) {
+            inside.cross(surface, ray.direction);
         }
-        None => emission.radiance,
+        f * found::arriving::<MEDIA>(scene, arriving, &ray, &inside) * weight
     }
 }
 
-/// The same, weighted by what choosing a place on it would have found.
+/// How a surface scatters light at a point; `None` if it cannot be seen there.
 #[inline(always)]
-fn shining(scene: impl Tracer, surface: &Surface, emission: &Emission, direction: DVec3, last: Option<&Last>) -> DVec3 {
-    let radiance = emitted(scene, surface, emission, direction);
-    let Some(last) = last.filter(|_| radiance != DVec3::ZERO) else { return radiance };
-    let lights = &scene.light_sampler;
-    match lights.emitter(surface.object, surface.part) {
-        Some(emitter) => radiance * power_heuristic(last.pdf, lights.emitter_pdf(&last.vertex, emitter, direction, surface.t)),
-        None => radiance,
+fn bsdf<'s>(scene: impl Tracer + 's, material: &'s Material, surface: &Surface, inside: &Inside) -> Option<Bsdf<'s>> {
+    match &material.recipe {
+        Recipe::Boundary { .. } => None,
+        Recipe::Glass(glass) => inside.outside_of(&scene, surface).map(|outside| Bsdf::Dielectric(glass.beside(outside))),
+        recipe => Some(recipe.bsdf(material, &scene.textures, surface)),
     }
 }
 
-/// Radiance that a ray finds which leaves the scene, weighted by what choosing that direction would have found.
-#[inline(always)]
-fn leaving(scene: impl Tracer, direction: DVec3, last: Option<&Last>) -> DVec3 {
-    let lights = &scene.light_sampler;
-    let weight = |pdf: &dyn Fn() -> f64| last.map_or(1.0, |last| power_heuristic(last.pdf, pdf()));
-    let mut radiance = scene.environment.radiance(direction);
-    if lights.has_distant() {
-        radiance *= weight(&|| lights.environment_pdf(&scene.environment, direction));
-        for (disc, pdf) in lights.discs(direction) {
-            radiance += disc * weight(&|| pdf);
-        }
-    }
-    radiance
-}
-
-/// The weight of what was found with the first density and could have been found with the second one.
-#[inline(always)]
-fn power_heuristic(pdf: f64, other: f64) -> f64 {
-    let ratio = other / pdf;
-    1.0 / (1.0 + ratio * ratio)
+/// Whether light that a ray along `to` brings to what a ray along `from` has met comes from inside of it, or leaves it.
+fn goes_through(scene: impl Tracer, surface: &Surface, from: DVec3, to: DVec3) -> bool {
+    scene.materials[surface.material as usize].recipe.has_inside() && (from.dot(surface.ng) < 0.0) == (to.dot(surface.ng) < 0.0)
 }

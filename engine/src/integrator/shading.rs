@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    material::{Bsdf, Material, Scattered},
+    material::{Bsdf, Scattered},
     math::orthonormal_basis,
-    scene::{Scene, Surface},
+    scene::Surface,
 };
 
 /// A BSDF and the frame that it stands in.
@@ -21,17 +21,16 @@ pub struct Shading<'s> {
 }
 
 impl<'s> Shading<'s> {
-    /// At the end of a ray along `direction`; `None` if the surface does not scatter light.
+    /// At the end of a ray along `direction`.
     #[inline(always)]
-    pub fn new(scene: &'s Scene, material: &'s Material, surface: &Surface, direction: DVec3) -> Option<Self> {
-        let bsdf = material.bsdf(&scene.textures, surface)?;
+    pub fn new(bsdf: Bsdf<'s>, surface: &Surface, direction: DVec3) -> Self {
         let outside = direction.dot(surface.ng) < 0.0;
         // A shading normal that looks away from the viewer tells nothing about what is seen.
         let z = if (direction.dot(surface.ns) < 0.0) == outside { surface.ns } else { surface.ng };
         let (x, y) = orthonormal_basis(z);
         let axes = [x, y, z];
         let wo = -DVec3::new(x.dot(direction), y.dot(direction), z.dot(direction));
-        Some(Self { bsdf, axes, ng: surface.ng, wo, outside })
+        Self { bsdf, axes, ng: surface.ng, wo, outside }
     }
 
     /// `f |cos|` for light from a direction, and the density with which [`Self::sample`] chooses it.

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     math::{UNIT, max_abs, orthonormal_basis},
-    sampling::{SphericalRectangle, concentric_disc, uniform_cone, uniform_cone_pdf, uniform_triangle},
+    sampling::{concentric_disc, uniform_cone, uniform_cone_pdf, uniform_triangle},
     shape::{Bounds, Disc, Sphere},
 };
 
@@ -23,8 +23,6 @@ pub enum Area {
         corner: DVec3,
         /// The edges.
         edges: [DVec3; 2],
-        /// Whether they are perpendicular.
-        right: bool,
     },
     /// All points `corner + a u + b v` with a, b and 1 - a - b in [0, 1].
     Triangle {
@@ -96,7 +94,7 @@ impl Emitter {
         match &self.area {
             Area::Sphere(sphere) => sphere.bounds(),
             Area::Disc(disc) => disc.bounds(),
-            Area::Parallelogram { corner, edges: [u, v], .. } => Bounds::of([*corner, *corner + *u, *corner + *v, *corner + *u + *v]),
+            Area::Parallelogram { corner, edges: [u, v] } => Bounds::of([*corner, *corner + *u, *corner + *v, *corner + *u + *v]),
             Area::Triangle { corner, edges: [u, v] } => Bounds::of([*corner, *corner + *u, *corner + *v]),
         }
     }
@@ -119,13 +117,7 @@ impl Emitter {
                 let (x, y) = orthonormal_basis(disc.normal);
                 self.towards(disc.center + x * at.x + y * at.y, from)
             }
-            Area::Parallelogram { corner, edges, right } => {
-                if let Some(seen) = self.seen_at_right_angles(*corner, *edges, *right, from) {
-                    let sample = self.towards(seen.sample(u), from)?;
-                    return Some(EmitterSample { pdf: 1.0 / seen.solid_angle(), ..sample });
-                }
-                self.towards(*corner + edges[0] * u.x + edges[1] * u.y, from)
-            }
+            Area::Parallelogram { corner, edges } => self.towards(*corner + edges[0] * u.x + edges[1] * u.y, from),
             Area::Triangle { corner, edges } => {
                 let [_, b1, b2] = uniform_triangle(u);
                 self.towards(*corner + edges[0] * b1 + edges[1] * b2, from)
@@ -138,17 +130,8 @@ impl Emitter {
     pub fn pdf(&self, from: DVec3, direction: DVec3, distance: f64) -> f64 {
         match &self.area {
             Area::Sphere(sphere) => Cone::of(sphere, from).map_or(0.0, |cone| uniform_cone_pdf(cone.sin2)),
-            Area::Parallelogram { corner, edges, right } => match self.seen_at_right_angles(*corner, *edges, *right, from) {
-                Some(seen) => 1.0 / seen.solid_angle(),
-                None => self.density(direction, distance * distance),
-            },
             _ => self.density(direction, distance * distance),
         }
-    }
-
-    #[inline]
-    fn seen_at_right_angles(&self, corner: DVec3, [u, v]: [DVec3; 2], right: bool, from: DVec3) -> Option<SphericalRectangle> {
-        if right { SphericalRectangle::new(corner, u, v, from) } else { None }
     }
 
     /// From one by area to one by solid angle (Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 6.2.5).

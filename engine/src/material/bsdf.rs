@@ -2,7 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{conductor::Conductor, diffuse::Diffuse, mirror::Mirror, refractive::Dielectric};
+use super::{
+    conductor::Conductor, diffuse::Diffuse, metallic_roughness::MetallicRoughness, mirror::Mirror, plastic::Plastic,
+    refractive::Dielectric, rough_diffuse::RoughDiffuse,
+};
 
 /// A direction that a BSDF has chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,12 +48,18 @@ impl Scattered {
 pub enum Bsdf<'a> {
     /// Lambert's reflection.
     Diffuse(Diffuse),
+    /// Rough diffuse reflection.
+    RoughDiffuse(RoughDiffuse),
     /// A perfect mirror.
     Mirror(Mirror),
     /// A metal.
     Conductor(Conductor<'a>),
     /// Glass, smooth or rough.
     Dielectric(Dielectric<'a>),
+    /// A clear coat over a diffuse base.
+    Plastic(Plastic<'a>),
+    /// The model of glTF.
+    MetallicRoughness(&'a MetallicRoughness<'a>),
 }
 
 impl Bsdf<'_> {
@@ -59,9 +68,12 @@ impl Bsdf<'_> {
     pub fn evaluate(&self, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
         match self {
             Self::Diffuse(model) => model.evaluate(wo, wi),
+            Self::RoughDiffuse(model) => model.evaluate(wo, wi),
             Self::Mirror(_) => (DVec3::ZERO, 0.0),
             Self::Conductor(model) => model.evaluate(wo, wi),
             Self::Dielectric(model) => model.evaluate(wo, wi),
+            Self::Plastic(model) => model.evaluate(wo, wi),
+            Self::MetallicRoughness(model) => model.evaluate(wo, wi),
         }
     }
 
@@ -70,26 +82,30 @@ impl Bsdf<'_> {
     pub fn sample(&self, wo: DVec3, pick: f64, u: DVec2) -> Option<Scattered> {
         match self {
             Self::Diffuse(model) => model.sample(wo, u),
+            Self::RoughDiffuse(model) => model.sample(wo, u),
             Self::Mirror(model) => model.sample(wo),
             Self::Conductor(model) => model.sample(wo, pick, u),
             Self::Dielectric(model) => model.sample(wo, pick, u),
+            Self::Plastic(model) => model.sample(wo, pick, u),
+            Self::MetallicRoughness(model) => model.sample(wo, pick, u),
         }
     }
 
     /// Whether [`Self::sample`] makes use of `pick`.
     #[inline]
     pub fn has_lobes(&self) -> bool {
-        !matches!(self, Self::Diffuse(_) | Self::Mirror(_))
+        !matches!(self, Self::Diffuse(_) | Self::RoughDiffuse(_) | Self::Mirror(_))
     }
 
     /// Whether all lobes are specular, so that there is no use in choosing points on lights.
     #[inline]
     pub fn is_specular(&self) -> bool {
         match self {
-            Self::Diffuse(_) => false,
+            Self::Diffuse(_) | Self::RoughDiffuse(_) | Self::Plastic(_) => false,
             Self::Mirror(_) => true,
             Self::Conductor(model) => model.is_specular(),
             Self::Dielectric(model) => model.is_specular(),
+            Self::MetallicRoughness(model) => model.is_specular(),
         }
     }
 }

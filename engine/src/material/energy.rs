@@ -12,9 +12,10 @@ use super::{
 };
 use crate::math::sin_cos;
 
-/// Turns of a quadrature over half of the azimuth, and heights.
-const TURNS: usize = 16;
-const HEIGHTS: usize = 32;
+/// Points of a quadrature, two neighbours of Fibonacci's sequence: for one roughness, for all, and for where much else is to do.
+const FINE: (u32, u32) = (2584, 1597);
+const MIDDLE: (u32, u32) = (987, 610);
+const COARSE: (u32, u32) = (610, 377);
 
 /// What white facets reflect once, and what Schlick's weights of grazing angles take of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,12 +24,12 @@ pub struct Albedo(Table<2>);
 impl Albedo {
     /// For one roughness along x and y, clamped as by [`Ggx::new`]; takes some milliseconds.
     pub fn fixed(alpha: [f64; 2]) -> Self {
-        Self(Table::fixed(&Ggx::clamped(alpha), &Facets::new()))
+        Self(Table::fixed(&Ggx::clamped(alpha), &Facets(Normals::of(alpha))))
     }
 
     /// For all isotropic roughnesses; of anisotropic ones it knows an estimate.
     pub fn over_roughness() -> Self {
-        Self(Table::over_roughness(&Facets::new()))
+        Self(Table::over_roughness(&Facets(Normals::half(MIDDLE))))
     }
 
     /// `1 - E(w)`: what white facets do not reflect at once of light from `w`, in [0, 1].
@@ -41,7 +42,20 @@ impl Albedo {
     /// `f0 + (f90 - f0) (1 - cos)^5` thus reflect `f0 E + (f90 - f0) E_5`.
     #[inline(always)]
     pub fn schlick(&self, ggx: &Ggx, w: DVec3) -> [f64; 2] {
-        self.0.at(ggx, w)
+        let [missing, excess] = self.0.at(ggx, w);
+        [missing, excess + (1.0 - missing) * schlick_weight(w.z.abs())]
+    }
+
+    /// As [`Self::schlick`] of a table for all roughnesses; for anisotropic facets, of which it knows nothing exact, a bound: nothing is missing, and
+    /// Schlick's part is that of isotropic ones, as rough as these are at least or on average, whichever is more.
+    #[inline]
+    pub fn schlick_at_most(&self, ggx: &Ggx, w: DVec3) -> [f64; 2] {
+        let alpha = ggx.alpha();
+        if alpha.x == alpha.y {
+            return self.schlick(ggx, w);
+        }
+        let five = |alpha: f64| self.schlick(&Ggx::clamped([alpha; 2]), w)[1];
+        [0.0, five(alpha.min_element()).max(five((0.5 * alpha.length_squared()).sqrt()))]
     }
 
     /// Mean of [`Self::missing`] over the cosine-weighted hemisphere.
@@ -53,7 +67,9 @@ impl Albedo {
     /// Means of [`Self::schlick`] over the cosine-weighted hemisphere.
     #[inline(always)]
     pub fn schlick_average(&self, ggx: &Ggx) -> [f64; 2] {
-        self.0.mean::<Facets>(ggx)
+        let [missing, excess] = self.0.mean::<Facets>(ggx);
+        // The mean of Schlick's weight itself is 1 / 21.
+        [missing, excess + 1.0 / 21.0]
     }
 }
 
@@ -69,24 +85,45 @@ pub struct DielectricAlbedo {
 impl DielectricAlbedo {
     /// For one roughness along x and y, clamped as by [`Ggx::new`]; `eta` is the index of the inside relative to the outside, above 0.
     pub fn fixed(eta: f64, alpha: [f64; 2]) -> Self {
-        Self { table: Table::fixed(&Ggx::clamped(alpha), &Interfaces::new(eta)), eta, transmitted: transmitted_average(eta) }
+        Self {
+            table: Table::fixed(&Ggx::clamped(alpha), &Interfaces { normals: Normals::of(alpha), eta }),
+            eta,
+            transmitted: transmitted_average(eta),
+        }
     }
 
     /// For all isotropic roughnesses; of anisotropic ones it knows an estimate.
     pub fn over_roughness(eta: f64) -> Self {
-        Self { table: Table::over_roughness(&Interfaces::new(eta)), eta, transmitted: transmitted_average(eta) }
+        Self {
+            table: Table::over_roughness(&Interfaces { normals: Normals::half(COARSE), eta }),
+            eta,
+            transmitted: transmitted_average(eta),
+        }
+    }
+
+    /// Index of the inside relative to the outside.
+    #[inline(always)]
+    pub fn eta(&self) -> f64 {
+        self.eta
+    }
+
+    /// Means of the transmittance of a smooth surface over the cosine-weighted hemispheres outside and inside.
+    #[inline(always)]
+    pub fn transmitted(&self) -> [f64; 2] {
+        self.transmitted
     }
 
     /// What is reflected of light from `w` on the outside, in [0, 1].
     #[inline]
     pub fn reflected(&self, ggx: &Ggx, w: DVec3) -> f64 {
-        self.table.at(ggx, w)[0] * fresnel(w.z.abs(), self.eta)
+        let [excess, outside, _] = self.table.at(ggx, w);
+        (excess + (1.0 - outside) * fresnel(w.z.abs(), self.eta)).clamp(0.0, 1.0)
     }
 
     /// Mean of [`Self::reflected`] over the cosine-weighted hemisphere.
     #[inline]
     pub fn reflected_average(&self, ggx: &Ggx) -> f64 {
-        self.table.mean::<Interfaces>(ggx)[0]
+        1.0 - self.transmitted[0] + self.table.mean::<Interfaces>(ggx)[0]
     }
 
     /// What is neither reflected nor refracted at once of light from `w`, on the side of `w`, in [0, 1].
@@ -137,40 +174,46 @@ pub fn fresnel(cos: f64, eta: f64) -> f64 {
     interface(DVec3::new(sin, 0.0, -cos), DVec3::Z, eta).reflected
 }
 
-/// Midpoints of a quadrature over visible normals.
+/// A quadrature over visible normals: a Fibonacci lattice, whose error stays small where facets begin to reflect down or totally.
 struct Normals {
-    turns: Vec<(f64, f64)>,
+    /// Sine and cosine of the turn, height in the spherical cap, weight.
+    points: Vec<((f64, f64), f64, f64)>,
 }
 
 impl Normals {
-    fn new() -> Self {
-        // All turns, so that anisotropic facets are served, too; isotropic ones need half of them.
-        Self { turns: (0..2 * TURNS).map(|turn| sin_cos((turn as f64 + 0.5) * PI / TURNS as f64)).collect() }
+    /// For isotropic facets and directions above x, where one half of the turns mirrors the other.
+    fn half(lattice: (u32, u32)) -> Self {
+        Self::new(lattice, PI)
+    }
+
+    /// For facets of the given roughness, which may be anisotropic.
+    fn of([x, y]: [f64; 2]) -> Self {
+        if x == y { Self::half(FINE) } else { Self::new(COARSE, 2.0 * PI) }
+    }
+
+    fn new((count, step): (u32, u32), turn: f64) -> Self {
+        let point = |n: u32| {
+            let height = 1.0 - (f64::from(n) + 0.5) / f64::from(count);
+            let across = (f64::from(n) * f64::from(step) + 0.5) % f64::from(count) / f64::from(count);
+            // Denser towards 1, where the few steep facets are that mirror light down.
+            (sin_cos(across * turn), 1.0 - height * height * height, 3.0 * height * height / f64::from(count))
+        };
+        Self { points: (0..count).map(point).collect() }
     }
 
     /// Mean of a function of the normals that are visible from `o`.
     fn mean<const K: usize>(&self, ggx: &Ggx, o: DVec3, f: impl Fn(DVec3) -> [f64; K]) -> [f64; K] {
-        // Isotropic facets are asked along x alone, where one half of the turns mirrors the other.
-        let turns = if ggx.alpha().x == ggx.alpha().y { TURNS } else { 2 * TURNS };
         let mut sum = [0.0; K];
-        for &turn in self.turns.iter().take(turns) {
-            for height in 0..HEIGHTS {
-                let value = f(ggx.sample_visible_at(o, (height as f64 + 0.5) / HEIGHTS as f64, turn));
-                sum = std::array::from_fn(|k| sum[k] + value[k]);
-            }
+        for &(turn, height, weight) in &self.points {
+            let value = f(ggx.sample_visible_at(o, height, turn));
+            sum = std::array::from_fn(|k| sum[k] + value[k] * weight);
         }
-        sum.map(|sum| sum / (turns * HEIGHTS) as f64)
+        sum
     }
 }
 
-/// Fills the table of white facets: what is missing, and Schlick's part.
+/// Fills the table of white facets: what is missing, and Schlick's part in excess of a smooth surface's, since it changes with the tilt alone.
 struct Facets(Normals);
-
-impl Facets {
-    fn new() -> Self {
-        Self(Normals::new())
-    }
-}
 
 impl Fill<2> for Facets {
     const FALLING: [bool; 2] = [true, false];
@@ -180,26 +223,22 @@ impl Fill<2> for Facets {
             let along = o.dot(m);
             let i = m * (2.0 * along) - o;
             let once = if i.z > 0.0 { ggx.sample_weight(o, i) } else { 0.0 };
-            [1.0 - once, once * schlick_weight(along)]
+            [1.0 - once, once * (schlick_weight(along) - schlick_weight(o.z))]
         })
     }
 
-    fn meaning(&self, value: [f64; 2], _: f64) -> [f64; 2] {
-        value
+    fn meaning(&self, [missing, excess]: [f64; 2], cos: f64) -> [f64; 2] {
+        [missing, excess - missing * schlick_weight(cos)]
     }
 }
 
-/// Fills the table of a dielectric: what is reflected outside, relative to a smooth surface; what is missing outside; what is missing inside.
+/// Fills the table of a dielectric: what is reflected outside in excess of a smooth surface; what is missing outside; what is missing inside.
 struct Interfaces {
     normals: Normals,
     eta: f64,
 }
 
 impl Interfaces {
-    fn new(eta: f64) -> Self {
-        Self { normals: Normals::new(), eta }
-    }
-
     /// Reflected and missing shares of light from the side to which `eta` is relative.
     fn shares(ggx: &Ggx, o: DVec3, m: DVec3, eta: f64) -> (f64, f64) {
         let at = interface(-o, m, eta);
@@ -219,11 +258,120 @@ impl Fill<3> for Interfaces {
             let (_, inside) = Self::shares(ggx, o, m, 1.0 / self.eta);
             [reflected, outside, inside]
         });
-        let smooth = fresnel(o.z, self.eta);
-        [if smooth > 0.0 { reflected / smooth } else { 1.0 }, outside, inside]
+        [reflected - (1.0 - outside) * fresnel(o.z, self.eta), outside, inside]
     }
 
-    fn meaning(&self, [ratio, outside, inside]: [f64; 3], cos: f64) -> [f64; 3] {
-        [ratio * fresnel(cos, self.eta), outside, inside]
+    fn meaning(&self, [excess, outside, inside]: [f64; 3], cos: f64) -> [f64; 3] {
+        [excess - outside * fresnel(cos, self.eta), outside, inside]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec2;
+
+    use super::*;
+
+    /// The mean over visible normals by many points of a sequence.
+    fn brute<const K: usize>(ggx: &Ggx, o: DVec3, f: impl Fn(DVec3) -> [f64; K]) -> [f64; K] {
+        const COUNT: u32 = 60_000;
+        let mut sum = [0.0; K];
+        for n in 0..COUNT {
+            let u = DVec2::new((f64::from(n) * 0.754_877_666_246_692_8).fract(), (f64::from(n) * 0.569_840_290_998_053_2).fract());
+            let value = f(ggx.sample_visible(o, u));
+            sum = std::array::from_fn(|k| sum[k] + value[k]);
+        }
+        sum.map(|sum| sum / f64::from(COUNT))
+    }
+
+    fn facets(ggx: &Ggx, o: DVec3, m: DVec3) -> [f64; 2] {
+        let i = m * (2.0 * o.dot(m)) - o;
+        let once = if i.z > 0.0 { ggx.sample_weight(o, i) } else { 0.0 };
+        [1.0 - once, once * schlick_weight(o.dot(m))]
+    }
+
+    const ALPHAS: [f64; 9] = [1e-4, 5e-4, 3e-3, 0.02, 0.07, 0.15, 0.35, 0.7, 1.0];
+    const COSINES: [f64; 9] = [1e-4, 1e-3, 0.01, 0.04, 0.11, 0.3, 0.55, 0.8, 1.0];
+
+    fn at(cos: f64) -> DVec3 {
+        DVec3::new((1.0 - cos * cos).sqrt(), 0.0, cos)
+    }
+
+    type Told<'a, const K: usize> = &'a dyn Fn(&Ggx, DVec3) -> [f64; K];
+
+    /// The worst error of tables for one roughness and for all, of what they tell of directions outside.
+    fn errors<const K: usize>(right: impl Fn(&Ggx, DVec3) -> [f64; K], told: [Told<K>; 2]) -> [f64; 2] {
+        let mut worst = [0f64; 2];
+        for (alpha, cos) in ALPHAS.into_iter().flat_map(|alpha| COSINES.map(|cos| (alpha, cos))) {
+            let (ggx, o) = (Ggx::clamped([alpha; 2]), at(cos));
+            let right = right(&ggx, o);
+            for (worst, told) in worst.iter_mut().zip(told) {
+                *worst = told(&ggx, o).into_iter().zip(right).fold(*worst, |worst, (a, b)| worst.max((a - b).abs()));
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn tables_of_facets_are_right() {
+        let over = Albedo::over_roughness();
+        let fixed = ALPHAS.map(|alpha| (alpha, Albedo::fixed([alpha; 2])));
+        let of = |ggx: &Ggx| &fixed.iter().find(|(alpha, _)| *alpha == ggx.alpha().x).unwrap().1;
+        let right = |ggx: &Ggx, o| brute(ggx, o, |m| facets(ggx, o, m));
+        let [one, all] = errors(right, [&|ggx, o| of(ggx).schlick(ggx, o), &|ggx, o| over.schlick(ggx, o)]);
+        assert!(one < 6e-4 && all < 1e-3, "{one} {all}");
+    }
+
+    #[test]
+    fn tables_of_anisotropic_facets_are_right() {
+        let (ggx, fixed) = (Ggx::clamped([0.6, 0.05]), Albedo::fixed([0.6, 0.05]));
+        for (cos, phi) in [(0.02, 0.1), (0.1, 0.8), (0.2, 1.57), (0.4, 1.2), (0.6, 0.4), (1.0, 0.0)] {
+            let o = DVec3::new(at(cos).x * f64::cos(phi), at(cos).x * f64::sin(phi), cos);
+            let error = DVec2::from_array(brute(&ggx, o, |m| facets(&ggx, o, m))) - DVec2::from_array(fixed.schlick(&ggx, o));
+            assert!(error.x.abs() < 6e-4 && error.y.abs() < 8e-3, "{error} at {o}");
+        }
+    }
+
+    #[test]
+    fn tables_of_dielectrics_are_right() {
+        for (eta, limit) in [(1.5, 2e-3), (4.0, 2e-3)] {
+            let over = DielectricAlbedo::over_roughness(eta);
+            let fixed = ALPHAS.map(|alpha| (alpha, DielectricAlbedo::fixed(eta, [alpha; 2])));
+            let of = |ggx: &Ggx| &fixed.iter().find(|(alpha, _)| *alpha == ggx.alpha().x).unwrap().1;
+            let right = |ggx: &Ggx, o: DVec3| {
+                brute(ggx, o, |m| {
+                    let (r, outside) = Interfaces::shares(ggx, o, m, eta);
+                    [r, outside, Interfaces::shares(ggx, o, m, 1.0 / eta).1]
+                })
+            };
+            let told =
+                |table: &DielectricAlbedo, ggx: &Ggx, o: DVec3| [table.reflected(ggx, o), table.missing(ggx, o), table.missing(ggx, -o)];
+            let [one, all] = errors(right, [&|ggx, o| told(of(ggx), ggx, o), &|ggx, o| told(&over, ggx, o)]);
+            assert!(one < limit && all < 2.0 * limit, "{eta}: {one} {all}");
+        }
+    }
+
+    /// Means against a sum over the hemisphere, for roughnesses between the rows of a table.
+    #[test]
+    fn means_are_means() {
+        let (facets, glass) = (Albedo::over_roughness(), DielectricAlbedo::over_roughness(1.5));
+        for alpha in [2e-5, 3e-4, 0.011, 0.17, 0.93] {
+            let ggx = Ggx::clamped([alpha; 2]);
+            const STEPS: u32 = 200_000;
+            let mut sum = [0.0; 4];
+            for step in 0..STEPS {
+                // Dense at grazing angles: cos^2 = v^4, d(cos^2) = 4 v^3 dv.
+                let v = (f64::from(step) + 0.5) / f64::from(STEPS);
+                let (o, weight) = (at(v * v), 4.0 * v * v * v / f64::from(STEPS));
+                let [missing, five] = facets.schlick(&ggx, o);
+                let told = [missing, five, glass.reflected(&ggx, o), glass.missing(&ggx, -o)];
+                sum = std::array::from_fn(|k| sum[k] + told[k] * weight);
+            }
+            let [missing, five] = facets.schlick_average(&ggx);
+            let told = [missing, five, glass.reflected_average(&ggx), glass.missing_average(&ggx)[1]];
+            for (sum, told) in sum.into_iter().zip(told) {
+                assert!((sum / told - 1.0).abs() < 2e-2, "{sum} is not {told} at {alpha}");
+            }
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! The local frame of a surface: z is the shading normal on the outward side.
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
-use crate::math::sin_cos;
+pub use crate::sampling::cosine_hemisphere;
 
 /// Whether two directions lie on the same side of the surface; a direction along the surface lies on neither.
 #[inline(always)]
@@ -17,14 +17,6 @@ pub fn same_side(a: DVec3, b: DVec3) -> bool {
 pub fn upright(a: DVec3, b: DVec3) -> (DVec3, DVec3) {
     let sign = 1f64.copysign(a.z);
     (DVec3::new(a.x, a.y, a.z * sign), DVec3::new(b.x, b.y, b.z * sign))
-}
-
-/// A direction on the side of positive z with density `cos / pi` by solid angle (Malley's method, pbrt-v4 A.5.3).
-#[inline]
-pub fn cosine_hemisphere(u: DVec2) -> DVec3 {
-    let radius = u.x.sqrt();
-    let (sin, cos) = sin_cos(2.0 * PI * u.y);
-    DVec3::new(radius * cos, radius * sin, (1.0 - u.x).max(0.0).sqrt())
 }
 
 /// Density of [`cosine_hemisphere`] on the side of the direction, by solid angle.

@@ -1,10 +1,10 @@
 //! The microfacet distribution GGX of Trowbridge and Reitz, anisotropic, with Smith's masking and shadowing (pbrt-v4 9.6).
 
-use std::f64::consts::{FRAC_1_PI, PI};
+use std::f64::consts::FRAC_1_PI;
 
 use glam::{DVec2, DVec3};
 
-use crate::math::sin_cos;
+use crate::sampling::sin_cos_of_turn;
 
 /// Below this alpha a lobe is specular.
 ///
@@ -82,7 +82,7 @@ impl Ggx {
     /// A normal that is visible from `o`, which must not point below the surface.
     #[inline]
     pub fn sample_visible(&self, o: DVec3, u: DVec2) -> DVec3 {
-        self.sample_visible_at(o, u.y, sin_cos(2.0 * PI * u.x))
+        self.sample_visible_at(o, u.y, sin_cos_of_turn(u.x))
     }
 
     /// As [`Self::sample_visible`], with the sine and cosine of the turn: a spherical cap in the space in which the surface is a hemisphere holds

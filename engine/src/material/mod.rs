@@ -5,28 +5,35 @@ mod conductor;
 pub mod dielectric;
 mod diffuse;
 mod energy;
+mod gloss;
 mod ideal;
 mod local;
+mod medium;
+mod metallic_roughness;
 pub mod metals;
 mod microfacet;
 mod mirror;
+mod plastic;
 mod recipe;
 mod refractive;
+mod rough_diffuse;
+mod sheen;
 mod table;
+#[cfg(test)]
+mod tests;
 
 use glam::DVec3;
 
 pub use self::{
     bsdf::{Bsdf, Scattered},
     ideal::Ideal,
-    recipe::Recipe,
+    medium::{Medium, Travel},
+    recipe::{Glass, Recipe},
 };
 
 use crate::{
     assets::ModelMaterial,
     description::{self, Rgb},
-    scene::Surface,
-    texture::Texture,
 };
 
 /// A compiled material.
@@ -86,12 +93,6 @@ impl Material {
             double_sided: material.double_sided,
             color_from_vertices: true,
         }
-    }
-
-    /// How it scatters light at a point; `None` if it does not.
-    #[inline(always)]
-    pub fn bsdf(&self, textures: &[Texture], surface: &Surface) -> Option<Bsdf<'_>> {
-        self.recipe.bsdf(self, textures, surface)
     }
 
     /// Whether it asks for texture coordinates.

@@ -5,14 +5,16 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::{
-    Bsdf, Material,
+    Bsdf, Material, Medium,
     conductor::{Conductor, Fresnel},
     diffuse::Diffuse,
     energy::{Albedo, DielectricAlbedo},
     microfacet::SMOOTH_ALPHA,
     mirror::Mirror,
+    plastic::Plastic,
     refractive::Dielectric,
     rgb,
+    rough_diffuse::RoughDiffuse,
 };
 use crate::{
     description::{self, Material as Description},
@@ -26,13 +28,25 @@ pub enum Recipe {
     /// Not at all.
     Nothing,
     /// It lets all light pass: the border of a medium.
-    Boundary,
+    Boundary {
+        /// What fills the inside.
+        interior: Option<Medium>,
+    },
     /// As Lambert's law says.
     Diffuse {
         /// Albedo, multiplied by `texture` where there is one.
         reflectance: DVec3,
         /// Index of the compiled texture.
         texture: Option<u32>,
+    },
+    /// As rough stone or clay does.
+    RoughDiffuse {
+        /// Albedo of the smooth surface, multiplied by `texture` where there is one.
+        reflectance: DVec3,
+        /// Index of the compiled texture.
+        texture: Option<u32>,
+        /// In [0, 1].
+        roughness: f64,
     },
     /// As a mirror.
     Mirror(Mirror),
@@ -46,18 +60,44 @@ pub enum Recipe {
         albedo: Option<Arc<Albedo>>,
     },
     /// As a dielectric.
-    Glass {
-        /// Index of refraction of the inside, relative to the outside.
-        eta: f64,
-        /// Multiplies what is reflected.
+    Glass(Glass),
+    /// As a dielectric coat over Lambert's law.
+    Plastic {
+        /// Albedo of the base, multiplied by `texture` where there is one.
         reflectance: DVec3,
-        /// Multiplies what is refracted.
-        transmittance: DVec3,
-        /// Roughness of the microfacets.
+        /// Index of the compiled texture.
+        texture: Option<u32>,
+        /// Roughness of the coat's microfacets.
         alpha: f64,
-        /// What facets reflect and refract once, where the rest is kept.
-        albedo: Option<Arc<DielectricAlbedo>>,
+        /// What the coat reflects and refracts once.
+        albedo: Arc<DielectricAlbedo>,
     },
+}
+
+/// A dielectric and what is inside.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Glass {
+    /// Index of refraction.
+    ior: f64,
+    /// Multiplies what is reflected.
+    reflectance: DVec3,
+    /// Multiplies what is refracted.
+    transmittance: DVec3,
+    /// Roughness of the microfacets.
+    alpha: f64,
+    /// What facets reflect and refract once in empty space, where the rest is kept.
+    albedo: Option<Arc<DielectricAlbedo>>,
+    interior: Option<Medium>,
+    priority: u8,
+}
+
+impl Glass {
+    /// The interface with something of this index of refraction outside.
+    #[inline(always)]
+    pub fn beside(&self, outside: f64) -> Dielectric<'_> {
+        let albedo = self.albedo.as_deref().filter(|_| outside == 1.0);
+        Dielectric::new(self.ior / outside, self.reflectance, self.transmittance, [self.alpha; 2], albedo)
+    }
 }
 
 impl Recipe {
@@ -72,33 +112,72 @@ impl Recipe {
                 let albedo = (*multiple_scattering && rough).then(|| Arc::new(Albedo::fixed(alpha)));
                 Self::Metal { fresnel: compiled(fresnel), alpha, albedo }
             }
-            Description::Glass { ior, reflectance, transmittance, roughness, multiple_scattering, .. } => {
+            Description::Glass { ior, reflectance, transmittance, roughness, multiple_scattering, interior, priority } => {
                 let alpha = roughness * roughness;
                 let albedo = (*multiple_scattering && alpha > SMOOTH_ALPHA).then(|| Arc::new(DielectricAlbedo::fixed(*ior, [alpha; 2])));
-                Self::Glass { eta: *ior, reflectance: rgb(*reflectance), transmittance: rgb(*transmittance), alpha, albedo }
+                let (reflectance, transmittance) = (rgb(*reflectance), rgb(*transmittance));
+                let interior = interior.as_ref().and_then(Medium::compile);
+                Self::Glass(Glass { ior: *ior, reflectance, transmittance, alpha, albedo, interior, priority: *priority })
             }
-            Description::RoughDiffuse { reflectance, texture, .. } | Description::Plastic { reflectance, texture, .. } => {
-                Self::Diffuse { reflectance: rgb(*reflectance), texture: *texture }
+            Description::RoughDiffuse { reflectance, texture, roughness } => {
+                Self::RoughDiffuse { reflectance: rgb(*reflectance), texture: *texture, roughness: *roughness }
+            }
+            Description::Plastic { reflectance, texture, ior, roughness } => {
+                let alpha = roughness * roughness;
+                let albedo = Arc::new(DielectricAlbedo::fixed(*ior, [alpha; 2]));
+                Self::Plastic { reflectance: rgb(*reflectance), texture: *texture, alpha, albedo }
             }
             Description::Emitter { .. } => Self::Nothing,
-            Description::Boundary { .. } => Self::Boundary,
+            Description::Boundary { interior } => Self::Boundary { interior: Medium::compile(interior) },
         }
     }
 
-    /// The BSDF at a point; `None` if light is not scattered there.
+    /// The BSDF at a point, in empty space.
     #[inline(always)]
-    pub fn bsdf(&self, material: &Material, textures: &[Texture], surface: &Surface) -> Option<Bsdf<'_>> {
-        Some(match self {
-            Self::Nothing | Self::Boundary => return None,
+    pub fn bsdf(&self, material: &Material, textures: &[Texture], surface: &Surface) -> Bsdf<'_> {
+        match self {
+            Self::Nothing | Self::Boundary { .. } => Bsdf::Diffuse(Diffuse { reflectance: DVec3::ZERO }),
             Self::Diffuse { reflectance, texture } => {
                 Bsdf::Diffuse(Diffuse { reflectance: colored(*reflectance, *texture, material, textures, surface) })
             }
-            Self::Mirror(mirror) => Bsdf::Mirror(*mirror),
-            Self::Metal { fresnel, alpha, albedo } => Bsdf::Conductor(Conductor::new(*fresnel, *alpha, albedo.as_deref())),
-            Self::Glass { eta, reflectance, transmittance, alpha, albedo } => {
-                Bsdf::Dielectric(Dielectric::new(*eta, *reflectance, *transmittance, [*alpha; 2], albedo.as_deref()))
+            Self::RoughDiffuse { reflectance, texture, roughness } => {
+                Bsdf::RoughDiffuse(RoughDiffuse::new(colored(*reflectance, *texture, material, textures, surface), *roughness))
             }
-        })
+            Self::Mirror(mirror) => Bsdf::Mirror(*mirror),
+            Self::Plastic { reflectance, texture, alpha, albedo } => {
+                let base = colored(*reflectance, *texture, material, textures, surface);
+                Bsdf::Plastic(Plastic::new(base, DVec3::ONE, [*alpha; 2], albedo))
+            }
+            Self::Metal { fresnel, alpha, albedo } => Bsdf::Conductor(Conductor::new(*fresnel, *alpha, albedo.as_deref())),
+            Self::Glass(glass) => Bsdf::Dielectric(glass.beside(1.0)),
+        }
+    }
+
+    /// Whether light goes through the surface into something.
+    #[inline]
+    pub fn has_inside(&self) -> bool {
+        matches!(self, Self::Boundary { .. } | Self::Glass(_))
+    }
+
+    /// What is behind the surface, if that is not empty.
+    #[inline]
+    pub fn interior(&self) -> Option<&Medium> {
+        match self {
+            Self::Boundary { interior } | Self::Glass(Glass { interior, .. }) => interior.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// Which of several that overlap is there: the highest.
+    #[inline]
+    pub fn priority(&self) -> u8 {
+        if let Self::Glass(glass) = self { glass.priority } else { 0 }
+    }
+
+    /// Index of refraction of the inside.
+    #[inline]
+    pub fn ior(&self) -> f64 {
+        if let Self::Glass(glass) = self { glass.ior } else { 1.0 }
     }
 }
 

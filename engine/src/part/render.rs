@@ -66,7 +66,11 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
             scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
         Render::Path { max_depth, roulette_depth } => {
-            scene.run(Tracing::new(Path::new(max_depth, roulette_depth), lattice, samples, cancel))
+            if scene.has_media() {
+                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth), lattice, samples, cancel))
+            } else {
+                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth), lattice, samples, cancel))
+            }
         }
     }
 }

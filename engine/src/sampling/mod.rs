@@ -1,13 +1,11 @@
 //! Samples: the numbers behind every choice, and what is chosen by them.
 
 mod filter;
-mod rectangle;
 mod sobol;
 mod warp;
 
 pub use self::{
     filter::PixelFilter,
-    rectangle::SphericalRectangle,
     sobol::Sampler,
     warp::{concentric_disc, cosine_hemisphere, sin_cos_of_turn, uniform_cone, uniform_cone_pdf, uniform_sphere, uniform_triangle},
 };

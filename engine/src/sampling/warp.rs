@@ -80,12 +80,6 @@ pub fn cosine_hemisphere(u: DVec2) -> DVec3 {
     DVec3::new(disc.x, disc.y, z.max(LEAST_COSINE))
 }
 
-/// The density of [`cosine_hemisphere`] per steradian, for a direction of that cosine; 0 below the horizon.
-#[inline(always)]
-pub fn cosine_hemisphere_pdf(cos_theta: f64) -> f64 {
-    cos_theta.max(0.0) / PI
-}
-
 /// A direction of the whole sphere, density 1 / (4 pi) per steradian: `u.x` is the part of the sphere above it, `u.y` its longitude in turns
 /// (Archimedes' map of the cylinder).
 #[inline]

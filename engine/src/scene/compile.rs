@@ -1,7 +1,7 @@
 //! From a description and its assets to a scene.
 
 use super::{
-    Scene, Statistics, Unbuilt,
+    Inside, Scene, Statistics, Unbuilt,
     emitters::emitters,
     error::{CompileError, Warning},
     place::{FARTHEST, Placer},
@@ -12,7 +12,7 @@ use crate::{
     camera::Camera,
     description::{self, AssetSource, Frame, Fresnel, Rgb, SourceId},
     light::{Environment, ImageEnvironment, Light, LightSampler, SunSky, turned},
-    material::{Material, rgb},
+    material::{Material, Medium, rgb},
     math::max_abs,
     sampling::PixelFilter,
     texture::{Image, Texture},
@@ -60,6 +60,9 @@ impl Scene {
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let materials =
             frame.scene.materials.iter().enumerate().map(|(i, m)| material(i, m, textures.len())).collect::<Result<Vec<_>>>()?;
+        let medium = frame.scene.medium.as_ref();
+        medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("the scene: {error}")))?;
+        let medium = medium.and_then(Medium::compile);
         let (environment, sun) = environment(&frame.scene.background, assets)?;
         let mut lights = lights;
         lights.extend(sun);
@@ -76,6 +79,8 @@ impl Scene {
             camera,
             lights,
             environment,
+            medium,
+            around_eye: Inside::default(),
             light_sampler,
             filter: PixelFilter::of(frame.film.filter),
             film: frame.film.clone(),

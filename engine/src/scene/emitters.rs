@@ -102,8 +102,7 @@ impl Found<'_> {
             }
             None => (corner, edges, false),
         };
-        let right = u.dot(v).abs() <= 1e-12 * (u.length_squared() * v.length_squared()).sqrt();
-        self.add(material, Area::Parallelogram { corner, edges: [u, v], right }, mirrored, object, part);
+        self.add(material, Area::Parallelogram { corner, edges: [u, v] }, mirrored, object, part);
     }
 
     fn add(&mut self, material: u32, area: Area, mirrored: bool, object: u32, part: u32) {

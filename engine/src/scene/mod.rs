@@ -6,6 +6,7 @@ mod error;
 mod forest;
 mod geometry;
 mod identity;
+mod inside;
 mod outlined;
 mod place;
 mod query;
@@ -19,6 +20,7 @@ mod visit;
 mod tests;
 
 pub use error::{CompileError, Warning};
+pub use inside::Inside;
 pub use query::Hit;
 pub use statistics::Statistics;
 pub use surface::{Crossing, Surface};
@@ -31,7 +33,7 @@ use crate::{
     camera::Camera,
     description::{Film, Quality, Render},
     light::{Environment, Light, LightSampler},
-    material::Material,
+    material::{Material, Medium, Recipe},
     sampling::PixelFilter,
     shape::Bounds,
     texture::Texture,
@@ -55,6 +57,10 @@ pub struct Scene {
     pub light_sampler: LightSampler,
     /// Where samples look from within a pixel.
     pub filter: PixelFilter,
+    /// What fills space outside of everything.
+    pub medium: Option<Medium>,
+    /// What the camera is inside of.
+    pub around_eye: Inside,
     /// What the frame is gathered on.
     pub film: Film,
     /// How light is followed.
@@ -74,6 +80,12 @@ impl Scene {
     /// Where in the world the scene's coordinates begin.
     pub fn begin(&self) -> DVec3 {
         -self.geometry.origin
+    }
+
+    /// Whether something fills space anywhere, or has a border that cannot be seen.
+    pub fn has_media(&self) -> bool {
+        let fills = |material: &Material| material.recipe.interior().is_some() || matches!(material.recipe, Recipe::Boundary { .. });
+        self.medium.is_some() || self.materials.iter().any(fills)
     }
 
     /// Lowest and highest coordinates, in the world, of all finite things.

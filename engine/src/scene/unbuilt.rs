@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Scene, Statistics, Warning};
+use super::{Inside, Scene, Statistics, Warning};
 use crate::description::Render;
 
 /// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, without the time that building it takes.
@@ -28,6 +28,10 @@ impl Unbuilt {
         let casts_no_shadow = |material: u32| transparent && materials[material as usize].passes_all_light();
         let eye = scene.camera.rays_start_at_eye().then(|| scene.camera.eye());
         scene.geometry.finish(eye, &scene.lights, casts_no_shadow);
+        let has_insides = scene.materials.iter().any(|material| material.recipe.has_inside());
+        if has_insides && matches!(scene.render, Render::Path { .. }) {
+            scene.around_eye = Inside::of(&scene, scene.camera.eye());
+        }
         scene.statistics = Statistics::of(&scene.geometry);
         scene
     }

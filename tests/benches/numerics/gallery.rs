@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 use glam::{DAffine3, DMat3, DVec3};
 use tessera_engine::{
     description::{
-        Camera, Falloff, Film, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind, Quality, Render, Shape, SourceId,
-        Texture,
+        Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind, Quality, Render,
+        Shape, SourceId, Texture,
     },
     part::{self, Rect, SampleRange},
     scene::Scene,

@@ -43,7 +43,7 @@ pub fn far_camera(rays: u64) -> Tally {
             for _ in 0..SAMPLES {
                 let (x, y) = (i + random.unit(), j + random.unit());
                 let [a, b] = [x, y].map(|x| (2.0 * x / SIDE as f64 - 1.0) * half);
-                perspective += shade(&scene.camera.ray(x, y));
+                perspective += shade(&scene.camera.ray(x, y, glam::DVec2::ZERO));
                 parallel += shade(&Ray::new(backward * 20.0 + right * a - up * b - scene.begin(), -backward));
                 tally.rays += 1;
             }

@@ -43,7 +43,7 @@ fn s1_is_the_published_scene() {
     assert_eq!(frame.film.filter, Filter::Point);
     assert_eq!(frame.quality.samples, 1);
     assert_eq!(frame.render, Render::Whitted { max_depth: 8, transparent_shadows: true, min_weight: 1.0 / 255.0 });
-    let Camera::Perspective { eye, look_at, horizontal_fov, .. } = frame.camera;
+    let Camera::Perspective { eye, look_at, horizontal_fov, .. } = frame.camera else { panic!() };
     assert_eq!((eye, look_at, horizontal_fov), ([0.0, 3.5, 11.0], [0.0, 0.8, 0.0], 45.0));
     let spheres = spheres(&job);
     assert_eq!(spheres.len(), 32);
@@ -105,7 +105,7 @@ fn a_bundle_evaluates_to_the_same_job_without_any_file() {
 #[test]
 fn a_job_without_a_camera_is_framed_by_itself() {
     let job = run(&small_job("").replace("camera = tessera.perspective { eye = {0, 0, 5} },", ""), &[], &[], BUDGET).unwrap();
-    let Camera::Perspective { eye, look_at, .. } = job.description.frame.camera;
+    let Camera::Perspective { eye, look_at, .. } = job.description.frame.camera else { panic!() };
     let distance = eye.iter().zip(look_at).map(|(eye, at)| (eye - at) * (eye - at)).sum::<f64>().sqrt();
     assert!(look_at.iter().all(|middle| middle.abs() < 1e-9), "the unit sphere's middle, got {look_at:?}");
     assert!(distance > 2.0 && distance < 20.0, "{distance}");
@@ -150,7 +150,7 @@ fn each_frame_of_a_sequence_is_a_job_of_its_own() {
     for (job, frame) in [(&first, 8.0), (&chosen, 12.0)] {
         let description = &job.description;
         assert_eq!(spheres(job)[0].0, [0.0, 0.0, frame]);
-        let Camera::Perspective { eye, .. } = description.frame.camera;
+        let Camera::Perspective { eye, .. } = description.frame.camera else { panic!() };
         assert_eq!(eye, [frame, 0.0, -5.0]);
         let number = format!("{frame:04}");
         assert_eq!(description.output.exr, format!("walk.{number}.exr"));

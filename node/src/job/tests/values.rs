@@ -1,7 +1,7 @@
 //! What keys become in the description.
 
 use tessera_engine::description::{
-    AssetSource, Camera, ColorSpace, Falloff, Light, Material, MeshData, ObjectKind, Render, Shape, Texture, Wrap,
+    AssetSource, Camera, ColorSpace, Environment, Falloff, Light, Material, MeshData, ObjectKind, Render, Shape, Texture, Wrap,
 };
 
 use super::{BUDGET, job_with, run, small_job};

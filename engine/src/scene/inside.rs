@@ -1,0 +1,104 @@
+//! What a ray is inside of.
+
+use glam::DVec3;
+
+use super::{Scene, Surface};
+use crate::{
+    material::{Medium, Recipe},
+    shape::Ray,
+};
+
+/// Closed objects that a ray is inside of, in the order in which it entered them (Schmidt and Budge, "Simple Nested Dielectrics in Ray Traced Images", JGT 7(2), 2002): where
+/// several overlap, the one of highest priority is there, of equal ones the last, and borders of the others do not show.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Inside {
+    entries: [Entry; MOST],
+    count: usize,
+}
+
+/// Objects that may overlap at one place; more are taken for empty space.
+const MOST: usize = 8;
+
+/// Surfaces that are looked at to find out what a point is inside of.
+const MOST_CROSSINGS: u32 = 1024;
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Entry {
+    object: u32,
+    material: u32,
+}
+
+impl Inside {
+    /// What a point is inside of, by the borders that a ray from there leaves.
+    pub fn of(scene: &Scene, point: DVec3) -> Self {
+        let mut entered: Vec<u32> = Vec::new();
+        let mut inside = Self::default();
+        let mut ray = Ray::new(point, DVec3::new(0.36, 0.8, 0.48));
+        for _ in 0..MOST_CROSSINGS {
+            let Some(surface) = scene.closest(&ray) else { break };
+            if scene.materials[surface.material as usize].recipe.has_inside() {
+                if ray.direction.dot(surface.ng) < 0.0 {
+                    entered.push(surface.object);
+                } else if let Some(at) = entered.iter().position(|&object| object == surface.object) {
+                    entered.swap_remove(at);
+                } else {
+                    inside.enter(&surface);
+                }
+            }
+            ray = surface.spawn(ray.direction);
+        }
+        inside
+    }
+
+    /// The index of refraction outside of a surface that the ray meets, if its border shows.
+    #[inline]
+    pub fn outside_of(&self, scene: &Scene, surface: &Surface) -> Option<f64> {
+        let priority = |material: u32| scene.materials[material as usize].recipe.priority();
+        let own = priority(surface.material);
+        let mut outside: Option<&Entry> = None;
+        for entry in self.entries[..self.count].iter().filter(|entry| entry.object != surface.object) {
+            if priority(entry.material) >= outside.map_or(0, |entry| priority(entry.material)) && !self.is_boundary(scene, entry) {
+                outside = Some(entry);
+            }
+        }
+        match outside {
+            Some(entry) if priority(entry.material) > own => None,
+            Some(entry) => Some(scene.materials[entry.material as usize].recipe.ior()),
+            None => Some(1.0),
+        }
+    }
+
+    fn is_boundary(&self, scene: &Scene, entry: &Entry) -> bool {
+        matches!(scene.materials[entry.material as usize].recipe, Recipe::Boundary { .. })
+    }
+
+    /// What fills the place.
+    #[inline]
+    pub fn medium<'s>(&self, scene: &'s Scene) -> Option<&'s Medium> {
+        let recipe = |entry: &Entry| &scene.materials[entry.material as usize].recipe;
+        match self.entries[..self.count].iter().max_by_key(|entry| recipe(entry).priority()) {
+            Some(entry) => recipe(entry).interior(),
+            None => scene.medium.as_ref(),
+        }
+    }
+
+    /// Goes through a surface along a direction.
+    #[inline]
+    pub fn cross(&mut self, surface: &Surface, direction: DVec3) {
+        if direction.dot(surface.ng) < 0.0 { self.enter(surface) } else { self.leave(surface) }
+    }
+
+    fn enter(&mut self, surface: &Surface) {
+        if self.count < MOST {
+            self.entries[self.count] = Entry { object: surface.object, material: surface.material };
+            self.count += 1;
+        }
+    }
+
+    fn leave(&mut self, surface: &Surface) {
+        if let Some(at) = self.entries[..self.count].iter().rposition(|entry| entry.object == surface.object) {
+            self.entries.copy_within(at + 1..self.count, at);
+            self.count -= 1;
+        }
+    }
+}
