@@ -252,7 +252,7 @@ mod tests {
         let rect = Rect { x: 0, y: 0, width: frame.film.width, height: frame.film.height };
         let met: std::collections::BTreeSet<u32> = (0..rect.area())
             .filter_map(|i| {
-                let ray = scene.camera.ray((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5);
+                let ray = scene.camera.ray((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5, glam::DVec2::ZERO);
                 scene.closest(&ray).map(|surface| surface.material)
             })
             .collect();

@@ -209,8 +209,9 @@ fn streams_find_what_single_rays_find() {
     maker.add(Shape::Sphere { center: [0.5, 1.0, 2.0], radius: 0.4 }, DAffine3::IDENTITY);
     let mut scene = maker.compile();
     let mut random = Random(17);
-    let mut rays: Vec<Ray> = (0..8_192).map(|i| scene.camera.ray(f64::from(i % 128) * 8.0, f64::from(i / 128) * 12.0)).collect();
-    rays.extend((0..8_192).map(|i| scene.camera.ray(480.0 + f64::from(i % 128) * 0.5, 400.0 + f64::from(i / 128) * 0.5)));
+    let mut rays: Vec<Ray> =
+        (0..8_192).map(|i| scene.camera.ray(f64::from(i % 128) * 8.0, f64::from(i / 128) * 12.0, DVec2::ZERO)).collect();
+    rays.extend((0..8_192).map(|i| scene.camera.ray(480.0 + f64::from(i % 128) * 0.5, 400.0 + f64::from(i / 128) * 0.5, DVec2::ZERO)));
     rays.extend(rays_of(&scene, 8_000));
     for ray in &mut rays[8_192..] {
         ray.t_max = if random.bits().is_multiple_of(4) { random.unit() * 20.0 } else { f64::INFINITY };

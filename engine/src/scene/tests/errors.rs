@@ -129,7 +129,7 @@ fn films_and_cameras_are_checked() {
 #[test]
 fn an_empty_scene_is_a_scene() {
     let scene = compile(vec![]);
-    let ray = scene.camera.ray(512.0, 384.0);
+    let ray = scene.camera.ray(512.0, 384.0, DVec2::ZERO);
     assert_eq!(scene.closest(&ray), None);
     assert!(!scene.any(&ray, |_, _| true));
     assert_eq!(scene.bounds(), None);

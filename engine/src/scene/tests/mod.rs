@@ -15,7 +15,7 @@ use crate::description::{
     Scene as Description, Shape, SourceId,
 };
 use crate::{scene::Scene, shape::Ray};
-use glam::{DAffine3, DMat3, DVec3};
+use glam::{DVec2, DAffine3, DMat3, DVec3};
 
 /// A small generator of numbers, the same in every run (PCG-XSH-RR).
 pub struct Random(pub u64);
@@ -199,7 +199,7 @@ pub fn rays_of(scene: &Scene, count: usize) -> Vec<Ray> {
     let mut random = Random(7);
     let mut rays = Vec::with_capacity(count);
     while rays.len() < count {
-        let mut ray = scene.camera.ray(random.unit() * 1024.0, random.unit() * 768.0);
+        let mut ray = scene.camera.ray(random.unit() * 1024.0, random.unit() * 768.0, DVec2::ZERO);
         for _ in 0..4 {
             rays.push(ray);
             let Some(surface) = scene.closest(&ray) else { break };

@@ -5,7 +5,7 @@ use crate::{
     accel::Simd,
     description::{Falloff, Light},
     light,
-    material::Bsdf,
+    material::Ideal,
     scene::{Tracer, Work},
 };
 
@@ -31,7 +31,7 @@ impl Work for Compare {
                         continue;
                     }
                     let ray = Ray { origin: start, direction, t_max: distance, leaves: surface.leaves(side) };
-                    let opaque = |material: u32| !matches!(scene.materials[material as usize].bsdf, Bsdf::Glass { .. });
+                    let opaque = |material: u32| !matches!(scene.materials[material as usize].ideal, Ideal::Glass { .. });
                     let expected = scene.any(&Ray { leaves: 0, ..ray }, |material, _| opaque(material));
                     assert_eq!(scene.any_before_light(index, &ray, |material, _| opaque(material)), expected, "{ray:?}");
                     *(if expected { &mut blocked } else { &mut free }) += 1;
