@@ -27,8 +27,10 @@ impl<'s> Shading<'s> {
         let bsdf = material.bsdf(&scene.textures, surface)?;
         let outside = direction.dot(surface.ng) < 0.0;
         // A shading normal that looks away from the viewer tells nothing about what is seen.
-        let z = if (direction.dot(surface.ns) < 0.0) == outside { surface.ns } else { surface.ng };
-        let (x, y) = orthonormal_basis(z);
+        let seen = |normal: &DVec3| (direction.dot(*normal) < 0.0) == outside;
+        let mapped = material.normal_map.as_ref().and_then(|map| map.normal(&scene.textures, surface)).filter(seen);
+        let z = mapped.unwrap_or(if seen(&surface.ns) { surface.ns } else { surface.ng });
+        let (x, y) = material.tangents.and_then(|_| surface.tangents_across(z)).unwrap_or_else(|| orthonormal_basis(z));
         let axes = [x, y, z];
         let wo = -DVec3::new(x.dot(direction), y.dot(direction), z.dot(direction));
         Some(Self { bsdf, axes, ng: surface.ng, wo, outside })

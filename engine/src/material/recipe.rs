@@ -107,7 +107,7 @@ impl Recipe {
 fn colored(color: DVec3, texture: Option<u32>, material: &Material, textures: &[Texture], surface: &Surface) -> DVec3 {
     let mut color = color;
     if let Some(texture) = texture {
-        let [r, g, b, _] = textures[texture as usize].rgba(surface.uv);
+        let [r, g, b, _] = textures[texture as usize].at(surface.uvs());
         color *= rgb([r, g, b]);
     }
     if material.color_from_vertices {

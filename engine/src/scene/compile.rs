@@ -64,7 +64,10 @@ impl Scene {
         let mut lights = lights;
         lights.extend(sun);
         let mut placed = Placer::new(&frame.scene, -begin, assets, materials, textures).place()?;
-        let (emitters, hidden) = emitters(&placed.geometry, &placed.materials);
+        for description in &placed.lights {
+            lights.push(light(description)?);
+        }
+        let (emitters, hidden) = emitters(&placed.geometry, &placed.materials, &placed.textures);
         if hidden > 0 {
             let message = format!(
                 "{hidden} objects shine that light is not sampled from (cones, cylinders, planes, unevenly scaled spheres): their light is noisy"

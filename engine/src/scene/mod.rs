@@ -6,6 +6,7 @@ mod error;
 mod forest;
 mod geometry;
 mod identity;
+mod models;
 mod outlined;
 mod place;
 mod query;

@@ -2,13 +2,13 @@
 
 use std::ops::ControlFlow;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::{
     Scene,
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
-    surface::{Crossing, Surface},
+    surface::{Crossing, Surface, in_world},
     tracer::{Tracer, Work},
 };
 #[cfg(target_arch = "x86_64")]
@@ -269,7 +269,7 @@ impl Scene {
         }
         let Some(cutoff) = material.alpha_cutoff else { return true };
         let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
-        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].rgba(mesh.uv(hit))[3]);
+        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].at(mesh.uvs_at(hit))[3]);
         material.base_alpha * texture * mesh.color(hit)[3] >= cutoff
     }
 
@@ -346,7 +346,11 @@ impl Scene {
             // Perpendicular, zero or NaN.
             _ => ng,
         };
-        let uv = if self.is_textured(placed.material) { mesh.uv(&at) } else { DVec2::ZERO };
+        let material = &self.materials[placed.material as usize];
+        let [uv, uv2] = if material.is_textured() { mesh.uvs_at(&at) } else { [DVec2::ZERO; 2] };
+        let tangents = material.tangents.as_ref().map_or([DVec3::ZERO; 2], |coordinates| {
+            mesh.tangents_at(&at, local.ns, coordinates).map(|tangent| transform.to_world.transform_vector3(tangent))
+        });
         let error = transform.error(local.error, local.position, point);
         Surface {
             point,
@@ -355,6 +359,8 @@ impl Scene {
             ng,
             ns,
             uv,
+            uv2,
+            tangents,
             color: mesh.color(&at),
             material: placed.material,
             object: hit.object,
@@ -375,11 +381,4 @@ impl Scene {
             point.uv = Sphere::uv(point.normal);
         }
     }
-}
-
-#[inline(always)]
-fn in_world(point: Point, hit: &Hit, material: u32) -> Surface {
-    let Point { position, error, normal, uv } = point;
-    let Hit { t, object, part, .. } = *hit;
-    Surface { point: position, t, error, ng: normal, ns: normal, uv, color: [1.0; 4], material, object, part, sphere: 0 }
 }

@@ -5,6 +5,7 @@ mod builds;
 mod cones;
 mod errors;
 mod meshes;
+mod models;
 mod pencils;
 mod rectangles;
 mod spawn;
@@ -15,7 +16,7 @@ use crate::description::{
     Scene as Description, Shape, SourceId,
 };
 use crate::{scene::Scene, shape::Ray};
-use glam::{DVec2, DAffine3, DMat3, DVec3};
+use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 /// A small generator of numbers, the same in every run (PCG-XSH-RR).
 pub struct Random(pub u64);
