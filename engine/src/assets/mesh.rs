@@ -11,8 +11,13 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Unit normals; empty: flat shading, by each triangle's own normal.
     pub normals: Vec<[f32; 3]>,
-    /// Texture coordinates as the material's texture asks for them, finite; v = 0 is the image's first row. Never empty where there is a texture.
+    /// First set of texture coordinates, finite; v = 0 is the image's first row. Never empty where the material has a texture.
     pub uvs: Vec<[f32; 2]>,
+    /// Second set; never empty where a texture of the material takes it (see [`crate::texture::Coordinates::second`]).
+    pub second_uvs: Vec<[f32; 2]>,
+    /// Unit tangents, or 0 where there is none, and the side of the bitangent, `side cross(normal, tangent)`: 1 or -1. Empty: those of the
+    /// texture coordinates, or nobody asks for them.
+    pub tangents: Vec<[f32; 4]>,
     /// Linear Rec. 709 and opacity, in [0, 1]; empty: white and opaque.
     pub colors: Vec<[f32; 4]>,
     /// Index into [`super::LoadedModel::materials`].

@@ -4,7 +4,10 @@
 //! allocated that the file's own length does not justify, and what a file asks for that is not modelled is named in a warning.
 
 mod files;
+mod gloss;
 mod gltf;
+mod light;
+mod material;
 mod mesh;
 mod mtl;
 mod normals;
@@ -16,15 +19,18 @@ mod reference;
 mod soup;
 mod warnings;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use glam::DAffine3;
 
 pub use crate::description::{AssetError, ModelFormat};
+pub use light::{ModelLight, ModelLightKind};
+pub use material::{AlphaMode, Anisotropy, Clearcoat, ModelEmission, ModelMaterial, NormalMap, Sheen, Specular, Transmission, Volume};
 pub use mesh::Mesh;
 #[doc(hidden)]
 pub use promises::check_promises;
 pub use reference::{model_format, model_references, part_references};
+pub(crate) use warnings::Warnings;
 
 use self::files::Files;
 use crate::{
@@ -41,8 +47,10 @@ pub struct LoadedModel {
     pub instances: Vec<Instance>,
     /// What the meshes are made of.
     pub materials: Vec<ModelMaterial>,
-    /// Images that the materials refer to.
+    /// Images with the coordinates that the materials look them up with: those that take the same image share it.
     pub textures: Vec<Texture>,
+    /// Lights, in the order of the file's hierarchy.
+    pub lights: Vec<ModelLight>,
     /// What the file asks for that is not modelled, each said once. The caller puts the file's name in front.
     pub warnings: Vec<String>,
 }
@@ -54,28 +62,6 @@ pub struct Instance {
     pub mesh: usize,
     /// Mesh to model coordinates; finite and invertible. A mirroring map (negative determinant) leaves front faces front faces.
     pub transform: DAffine3,
-}
-
-/// The surface of a mesh: Lambertian, of the product of base colour, texture and vertex colour.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ModelMaterial {
-    /// The file's name for it, or its number there.
-    pub name: String,
-    /// Linear Rec. 709 and opacity, each in [0, 1].
-    pub base_color: [f32; 4],
-    /// Index into [`LoadedModel::textures`]; [`Mesh::uvs`] are already those that it asks for.
-    pub texture: Option<usize>,
-    /// The surface is cut away where opacity is below this; `None`: opaque everywhere.
-    pub alpha_cutoff: Option<f32>,
-    /// Whether the back of its triangles is seen too.
-    pub double_sided: bool,
-}
-
-impl ModelMaterial {
-    /// Grey without texture.
-    fn matte(name: &str, grey: f32, double_sided: bool) -> Self {
-        Self { name: name.to_owned(), base_color: [grey, grey, grey, 1.0], texture: None, alpha_cutoff: None, double_sided }
-    }
 }
 
 /// Reads a model and all files that it refers to.

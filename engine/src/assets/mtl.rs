@@ -3,8 +3,9 @@
 use std::{collections::BTreeMap, sync::Arc};
 
 use super::{
-    AssetError, ModelMaterial,
+    AlphaMode, AssetError, ModelEmission, ModelMaterial, NormalMap,
     files::{Context, Files},
+    gloss::Gloss,
     mesh::fraction,
     obj::{Line, lines, numbers},
     reference::name_beside,
@@ -12,7 +13,7 @@ use super::{
 };
 use crate::{
     description::{ColorSpace, Wrap},
-    texture::{Image, Texture},
+    texture::{Coordinates, Image, Texture},
 };
 
 /// A material as the file says it.
@@ -27,6 +28,13 @@ struct Entry {
     opacity_texture: Option<String>,
     /// d, or 1 - Tr.
     opacity: f32,
+    /// Ke.
+    emission: Option<[f32; 3]>,
+    /// map_Ke.
+    emission_texture: Option<Map>,
+    /// norm.
+    normal: Option<Map>,
+    gloss: Gloss,
     /// Statements that would change the picture.
     unmodelled: Vec<&'static str>,
 }
@@ -42,7 +50,7 @@ pub(super) const DEFAULT_GREY: f32 = 0.8;
 /// The textures of an MTL file, relative to the model's folder.
 pub(super) fn references(name: &str, bytes: &[u8]) -> Result<Vec<String>, AssetError> {
     let entries = parse(name, bytes, &mut Warnings::default())?;
-    Ok(entries.into_iter().filter_map(|entry| entry.texture).map(|texture| texture.file).collect())
+    Ok(entries.into_iter().flat_map(|entry| [entry.texture, entry.emission_texture, entry.normal]).flatten().map(|map| map.file).collect())
 }
 
 /// Materials and textures of all libraries of an OBJ file.
@@ -50,7 +58,8 @@ pub(super) fn references(name: &str, bytes: &[u8]) -> Result<Vec<String>, AssetE
 pub(super) struct Library {
     pub materials: Vec<ModelMaterial>,
     pub textures: Vec<Texture>,
-    images: BTreeMap<String, Arc<Image>>,
+    /// By file, and whether its numbers are linear.
+    images: BTreeMap<(String, bool), Arc<Image>>,
 }
 
 impl Library {
@@ -61,18 +70,11 @@ impl Library {
             return Ok(());
         }
         for entry in parse(name, &files.part(name)?, warnings)? {
-            let texture = match &entry.texture {
-                Some(map) if files.has(&map.file) => {
-                    Some(self.texture(map, files).context(|| format!("{name}: material {:?}", entry.name))?)
-                }
-                Some(map) => {
-                    let text = format!("its texture {:?} is not there; drawn without it", map.file);
-                    warnings.object("material", format!("{:?}", entry.name), text);
-                    None
-                }
-                None => None,
-            };
-            self.materials.push(entry.into_material(texture, &self.textures, warnings));
+            let mut find = |map: &Option<Map>, space| self.find_texture(name, &entry.name, map.as_ref(), space, files, warnings);
+            let texture = find(&entry.texture, ColorSpace::Srgb)?;
+            let emission = find(&entry.emission_texture, ColorSpace::Srgb)?;
+            let normal = find(&entry.normal, ColorSpace::Linear)?;
+            self.materials.push(entry.into_material(texture, emission, normal, &self.textures, warnings));
         }
         Ok(())
     }
@@ -82,17 +84,41 @@ impl Library {
         self.materials.iter().rposition(|material| material.name == name)
     }
 
-    fn texture(&mut self, map: &Map, files: &Files<'_>) -> Result<usize, AssetError> {
-        let image = match self.images.get(&map.file) {
+    /// The number of a material's texture, where its file is there.
+    fn find_texture(
+        &mut self,
+        library: &str,
+        material: &str,
+        map: Option<&Map>,
+        space: ColorSpace,
+        files: &Files<'_>,
+        warnings: &mut Warnings,
+    ) -> Result<Option<usize>, AssetError> {
+        match map {
+            None => Ok(None),
+            Some(map) if files.has(&map.file) => {
+                self.texture(map, space, files).map(Some).context(|| format!("{library}: material {material:?}"))
+            }
+            Some(map) => {
+                let text = format!("its texture {:?} is not there; drawn without it", map.file);
+                warnings.object("material", format!("{material:?}"), text);
+                Ok(None)
+            }
+        }
+    }
+
+    fn texture(&mut self, map: &Map, space: ColorSpace, files: &Files<'_>) -> Result<usize, AssetError> {
+        let key = (map.file.clone(), space == ColorSpace::Linear);
+        let image = match self.images.get(&key) {
             Some(known) => known.clone(),
             None => {
-                let decoded = Image::decode(&files.part(&map.file)?, ColorSpace::Srgb);
+                let decoded = Image::decode(&files.part(&map.file)?, space);
                 let image = Arc::new(decoded.context(|| map.file.clone())?);
-                self.images.insert(map.file.clone(), image.clone());
+                self.images.insert(key, image.clone());
                 image
             }
         };
-        self.textures.push(Texture::Image { image, wrap: [map.wrap; 2] });
+        self.textures.push(Texture::Image { image, wrap: [map.wrap; 2], coordinates: Coordinates::default() });
         Ok(self.textures.len() - 1)
     }
 }
@@ -102,20 +128,26 @@ impl Entry {
         Self { name: name.to_owned(), opacity: 1.0, ..Self::default() }
     }
 
-    /// Opacity is rounded: blending is not modelled.
-    fn into_material(self, texture: Option<usize>, textures: &[Texture], warnings: &mut Warnings) -> ModelMaterial {
+    fn into_material(
+        self,
+        texture: Option<usize>,
+        emission_texture: Option<usize>,
+        normal: Option<usize>,
+        textures: &[Texture],
+        warnings: &mut Warnings,
+    ) -> ModelMaterial {
         let mut warn = |wanted: bool, text: String| {
             if wanted {
                 warnings.object("material", format!("{:?}", self.name), text);
             }
         };
         for statement in &self.unmodelled {
-            warn(true, format!("{statement} not modelled; drawn diffuse"));
+            warn(true, format!("{statement} not modelled; drawn without"));
         }
         let own_mask = self.opacity_texture.is_some()
             && self.opacity_texture.as_ref() == self.texture.as_ref().map(|map| &map.file)
             && texture.is_some_and(|texture| textures[texture].has_opacity());
-        warn(self.opacity < 1.0, "transparency (d, Tr) is not modelled; left out where it is less than half opaque".into());
+        warn(self.gloss.is_clear(), "refraction (illum) is not modelled; drawn as its opacity (d) says".into());
         warn(
             self.opacity_texture.is_some() && !own_mask,
             "opacity maps (map_d) are modelled only as the opacity of map_Kd's own file".into(),
@@ -124,12 +156,21 @@ impl Entry {
         warn(dark, "its Kd is black, which would hide its texture; the texture is drawn as it is".into());
         let default = if texture.is_some() { 1.0 } else { DEFAULT_GREY };
         let [r, g, b] = if dark { [1.0; 3] } else { self.diffuse.unwrap_or([default; 3]) };
-        let alpha_cutoff = (own_mask || self.opacity < 1.0).then_some(0.5);
+        let alpha = if own_mask || self.opacity < 1.0 { AlphaMode::Blend } else { AlphaMode::Opaque };
         // Only the file of map_d says that its opacity counts.
         let opacity =
             if own_mask || texture.is_none_or(|texture| !textures[texture].has_opacity()) { self.opacity } else { self.opacity.round() };
-        let base_color = [r, g, b, opacity].map(fraction);
-        ModelMaterial { name: self.name, base_color, texture, alpha_cutoff, double_sided: true }
+        let radiance = self.emission.unwrap_or([if emission_texture.is_some() { 1.0 } else { 0.0 }; 3]).map(|value| value.max(0.0));
+        let mut material = ModelMaterial {
+            base_color: [r, g, b, opacity].map(fraction),
+            base_color_texture: texture,
+            alpha,
+            emission: ModelEmission { radiance, texture: emission_texture.filter(|_| radiance != [0.0; 3]) },
+            normal: normal.map(|texture| NormalMap { texture, scale: 1.0 }),
+            ..ModelMaterial::matte(&self.name, 1.0, true)
+        };
+        self.gloss.polish(&mut material);
+        material
     }
 }
 
@@ -161,19 +202,17 @@ impl Entry {
             "Tr" => self.opacity = 1.0 - numbers(&line.rest)?.first().copied().unwrap_or(0.0),
             "map_Kd" => self.texture = self.map(file, &line.rest, warnings)?,
             "map_d" => self.opacity_texture = self.map(file, &line.rest, warnings)?.map(|map| map.file),
-            "Ke" | "map_Ke" => {
-                if numbers(&line.rest).is_ok_and(|values| values.iter().all(|&value| value == 0.0)) {
-                    return Ok(());
-                }
-                self.unmodelled("emission (Ke) is");
-            }
-            "Ks" | "map_Ks" => {
-                if numbers(&line.rest).is_ok_and(|values| values.iter().all(|&value| value == 0.0)) {
-                    return Ok(());
-                }
-                self.unmodelled("gloss (Ks) is");
-            }
-            "bump" | "map_bump" | "map_Bump" | "norm" => self.unmodelled("bump and normal maps are"),
+            "Ke" => match *numbers(&line.rest)? {
+                [grey] => self.emission = Some([grey; 3]),
+                [r, g, b, ..] => self.emission = Some([r, g, b]),
+                _ => {}
+            },
+            "map_Ke" => self.emission_texture = self.map(file, &line.rest, warnings)?,
+            "norm" => self.normal = self.map(file, &line.rest, warnings)?,
+            "bump" | "map_bump" | "map_Bump" => self.unmodelled("bump maps are"),
+            "map_Ks" | "map_Ns" | "map_Pr" | "map_Pm" => self.unmodelled("textures of gloss (map_Ks, map_Ns, map_Pr, map_Pm) are"),
+            "Ps" | "map_Ps" | "aniso" | "anisor" => self.unmodelled("sheen and anisotropy (Ps, aniso) are"),
+            keyword @ ("Ks" | "Ns" | "Ni" | "illum" | "Pr" | "Pm" | "Pc" | "Pcr") => self.gloss.read(keyword, &numbers(&line.rest)?),
             "disp" => self.unmodelled("displacement is"),
             _ => {}
         }

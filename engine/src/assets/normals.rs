@@ -82,7 +82,8 @@ fn area(corners: [[f32; 3]; 3]) -> DVec3 {
     (b - a).cross(c - a)
 }
 
-fn unit(v: DVec3) -> Option<[f32; 3]> {
+/// A vector of length 1; `None` for one that has no direction.
+pub(super) fn unit(v: DVec3) -> Option<[f32; 3]> {
     let length = v.length();
     (length > 0.0 && length.is_finite()).then(|| (v / length).to_array().map(|x| x as f32))
 }

@@ -255,7 +255,7 @@ impl Reader {
         }
         self.warnings.flat_triangles(self.soup.flat);
         let (mut meshes, bad_normals) = self.soup.into_meshes(&self.materials);
-        for mesh in meshes.iter_mut().filter(|mesh| mesh.uvs.is_empty() && materials[mesh.material].texture.is_some()) {
+        for mesh in meshes.iter_mut().filter(|mesh| mesh.uvs.is_empty() && materials[mesh.material].textures().next().is_some()) {
             mesh.uvs = vec![[0.0; 2]; mesh.positions.len()];
             let text = "has a texture, but the file no texture coordinates (vt); drawn in one of its colours";
             self.warnings.object("material", format!("{:?}", mesh.name), text);
@@ -264,7 +264,8 @@ impl Reader {
             self.warnings.file("some normals have no direction; their triangles' are taken there");
         }
         let instances = (0..meshes.len()).map(|mesh| Instance { mesh, transform: DAffine3::IDENTITY }).collect();
-        Ok(LoadedModel { meshes, instances, materials, textures: self.library.textures, warnings: self.warnings.into_texts() })
+        let (textures, warnings) = (self.library.textures, self.warnings.into_texts());
+        Ok(LoadedModel { meshes, instances, materials, textures, lights: Vec::new(), warnings })
     }
 }
 

@@ -59,7 +59,7 @@ fn finish(soup: Soup, mut warnings: Warnings) -> Result<LoadedModel, AssetError>
         warnings.file("some normals have no direction; their triangles' are taken there");
     }
     let instances = (0..meshes.len()).map(|mesh| Instance { mesh, transform: DAffine3::IDENTITY }).collect();
-    Ok(LoadedModel { meshes, instances, materials, textures: Vec::new(), warnings: warnings.into_texts() })
+    Ok(LoadedModel { meshes, instances, materials, warnings: warnings.into_texts(), ..LoadedModel::default() })
 }
 
 /// The reader's message says the same thing over several lines: the first one and the text that it is about are enough.

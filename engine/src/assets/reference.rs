@@ -16,7 +16,7 @@ pub fn model_format(file_name: &str) -> Option<ModelFormat> {
 }
 
 /// Names of the files that a model file refers to, relative to its folder, sorted, each once: the names of [`crate::description::Model::parts`].
-/// Only files that its picture needs are named: no normal maps, for instance.
+/// Only files that its picture needs are named: no occlusion maps, for instance.
 ///
 /// Of each of them, [`part_references`] may name more. An OBJ file is read, with a warning, even where the libraries and textures that it
 /// names are left out of its parts; a glTF file needs all of them.

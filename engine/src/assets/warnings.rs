@@ -5,7 +5,7 @@ const MAX_NAMES: usize = 4;
 
 /// Warnings in the order in which they first came up.
 #[derive(Default)]
-pub(super) struct Warnings {
+pub(crate) struct Warnings {
     entries: Vec<Entry>,
 }
 

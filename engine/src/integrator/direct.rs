@@ -16,7 +16,7 @@ use crate::{
 pub fn albedo(scene: impl Tracer, material: &Material, surface: &Surface, reflectance: DVec3) -> DVec3 {
     let mut albedo = reflectance;
     if let Some(texture) = material.texture() {
-        let [r, g, b, _] = scene.textures[texture as usize].rgba(surface.uv);
+        let [r, g, b, _] = scene.textures[texture as usize].at(surface.uvs());
         albedo *= rgb([r, g, b]);
     }
     if material.color_from_vertices {

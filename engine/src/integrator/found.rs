@@ -42,13 +42,16 @@ fn emitted(scene: impl Tracer, surface: &Surface, emission: &Emission, direction
     if !emission.two_sided && direction.dot(surface.ng) >= 0.0 {
         return DVec3::ZERO;
     }
-    match emission.texture {
-        Some(texture) => {
-            let [r, g, b, _] = scene.textures[texture as usize].rgba(surface.uv);
-            emission.radiance * rgb([r, g, b])
-        }
-        None => emission.radiance,
+    let mut radiance = emission.radiance;
+    if let Some(texture) = emission.texture {
+        let [r, g, b, _] = scene.textures[texture as usize].at(surface.uvs());
+        radiance *= rgb([r, g, b]);
     }
+    if emission.color_from_vertices {
+        let [r, g, b, _] = surface.color;
+        radiance *= rgb([r, g, b]);
+    }
+    radiance
 }
 
 /// Radiance that a ray finds which leaves the scene, weighted by what choosing that direction would have found.

@@ -1,13 +1,13 @@
 //! Path tracing: all light that a scene's materials pass on.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{Integrator, RayCounts, found, shading::Shading};
 use crate::{
     light::{Arriving, Vertex},
-    material::{Bsdf, Material, Medium, Recipe, Scattered, Travel},
+    material::{Bsdf, Material, Medium, MetallicRoughness, Recipe, Scattered, Travel},
     sampling::Sampler,
-    scene::{Inside, Surface, Tracer},
+    scene::{Inside, Scene, Surface, Tracer},
     shape::Ray,
 };
 
@@ -126,11 +126,12 @@ impl<const MEDIA: bool> Path<MEDIA> {
         if let Some(emission) = &material.emission {
             *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref());
         }
-        let Some(bsdf) = bsdf(scene, material, surface, &walk.inside) else { return Next::Passes };
+        let mut room = None;
+        let Some((bsdf, turn)) = bsdf(&scene, material, surface, &walk.inside, &mut room) else { return Next::Passes };
         if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
             return Next::Ends;
         }
-        let shading = Shading::new(bsdf, surface, direction);
+        let shading = Shading::new(bsdf, turn, &scene, material, surface, direction);
         let vertex = Vertex { point: surface.point, normal: Some(surface.ng) };
         if !shading.bsdf.is_specular() {
             let evaluate = |direction| shading.evaluate(direction);
@@ -160,7 +161,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         }
         let medium = walk.inside.medium(&scene)?;
         let distance = met.map_or(f64::INFINITY, |surface| surface.t);
-        let u = if medium.scatters() { sampler.pair(sets + set::TRAVEL) } else { glam::DVec2::ZERO };
+        let u = if medium.scatters() { sampler.pair(sets + set::TRAVEL) } else { DVec2::ZERO };
         match medium.travel(distance, u) {
             Travel::Arrives(weight) => {
                 walk.throughput *= weight;
@@ -283,14 +284,26 @@ impl<const MEDIA: bool> Path<MEDIA> {
     }
 }
 
-/// How a surface scatters light at a point; `None` if it cannot be seen there.
+/// How a surface scatters light at a point, and the turn of its tangent; `None` if it cannot be seen there. `room` is where a large model is put, so that small ones stay small.
 #[inline(always)]
-fn bsdf<'s>(scene: impl Tracer + 's, material: &'s Material, surface: &Surface, inside: &Inside) -> Option<Bsdf<'s>> {
-    match &material.recipe {
-        Recipe::Boundary { .. } => None,
-        Recipe::Glass(glass) => inside.outside_of(&scene, surface).map(|outside| Bsdf::Dielectric(glass.beside(outside))),
-        recipe => Some(recipe.bsdf(material, &scene.textures, surface)),
-    }
+fn bsdf<'s: 'r, 'r>(
+    scene: &'s Scene,
+    material: &'s Material,
+    surface: &Surface,
+    inside: &Inside,
+    room: &'r mut Option<MetallicRoughness<'s>>,
+) -> Option<(Bsdf<'r>, DVec2)> {
+    let bsdf = match &material.recipe {
+        Recipe::Boundary { .. } => return None,
+        Recipe::Glass(glass) => Bsdf::Dielectric(glass.beside(inside.outside_of(scene, surface)?)),
+        Recipe::Model(model) => {
+            let outside = if model.ior().is_some() { inside.outside_of(scene, surface)? } else { 1.0 };
+            let (model, turn) = model.at(outside, &scene.textures, surface);
+            return Some((Bsdf::MetallicRoughness(room.insert(model)), turn));
+        }
+        recipe => recipe.bsdf(material, &scene.textures, surface),
+    };
+    Some((bsdf, DVec2::X))
 }
 
 /// Whether light that a ray along `to` brings to what a ray along `from` has met comes from inside of it, or leaves it.

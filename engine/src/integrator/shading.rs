@@ -3,9 +3,9 @@
 use glam::{DVec2, DVec3};
 
 use crate::{
-    material::{Bsdf, Scattered},
+    material::{Bsdf, Material, Scattered},
     math::orthonormal_basis,
-    scene::Surface,
+    scene::{Scene, Surface},
 };
 
 /// A BSDF and the frame that it stands in.
@@ -21,13 +21,18 @@ pub struct Shading<'s> {
 }
 
 impl<'s> Shading<'s> {
-    /// At the end of a ray along `direction`.
+    /// At the end of a ray along `direction`. The BSDF's x lies along the surface's tangent, turned by an angle of this cosine and sine.
     #[inline(always)]
-    pub fn new(bsdf: Bsdf<'s>, surface: &Surface, direction: DVec3) -> Self {
+    pub fn new(bsdf: Bsdf<'s>, turn: DVec2, scene: &Scene, material: &Material, surface: &Surface, direction: DVec3) -> Self {
         let outside = direction.dot(surface.ng) < 0.0;
         // A shading normal that looks away from the viewer tells nothing about what is seen.
-        let z = if (direction.dot(surface.ns) < 0.0) == outside { surface.ns } else { surface.ng };
-        let (x, y) = orthonormal_basis(z);
+        let seen = |normal: &DVec3| (direction.dot(*normal) < 0.0) == outside;
+        let mapped = material.normal_map.as_ref().and_then(|map| map.normal(&scene.textures, surface)).filter(seen);
+        let z = mapped.unwrap_or(if seen(&surface.ns) { surface.ns } else { surface.ng });
+        let (x, y) = match material.tangents.and_then(|_| surface.tangents_across(z)) {
+            Some((x, y)) => (x * turn.x + y * turn.y, y * turn.x - x * turn.y),
+            None => orthonormal_basis(z),
+        };
         let axes = [x, y, z];
         let wo = -DVec3::new(x.dot(direction), y.dot(direction), z.dot(direction));
         Self { bsdf, axes, ng: surface.ng, wo, outside }

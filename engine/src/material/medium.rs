@@ -38,6 +38,11 @@ impl Medium {
         (extinction != DVec3::ZERO).then_some(Self { extinction, scattering, anisotropy: medium.anisotropy })
     }
 
+    /// One that only absorbs; `None` if it does not.
+    pub fn absorbing(extinction: DVec3) -> Option<Self> {
+        (extinction != DVec3::ZERO).then_some(Self { extinction, scattering: DVec3::ZERO, anisotropy: 0.0 })
+    }
+
     /// The share of light that is left after a distance: Beer and Lambert's law.
     pub fn transmittance(&self, distance: f64) -> DVec3 {
         (self.extinction * -distance).map(|x| if x == 0.0 || x.is_nan() { 1.0 } else { exp(x) })

@@ -2,21 +2,24 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 use super::{
-    Bsdf, Material, Medium,
+    Bsdf, Material, Medium, ModelSurface, SharedTables,
     conductor::{Conductor, Fresnel},
     diffuse::Diffuse,
     energy::{Albedo, DielectricAlbedo},
+    metallic_roughness::{MetallicRoughness, Parameters, Tables},
     microfacet::SMOOTH_ALPHA,
     mirror::Mirror,
     plastic::Plastic,
     refractive::Dielectric,
     rgb,
     rough_diffuse::RoughDiffuse,
+    sheen::SheenAlbedo,
 };
 use crate::{
+    assets::ModelMaterial,
     description::{self, Material as Description},
     scene::Surface,
     texture::Texture,
@@ -72,6 +75,52 @@ pub enum Recipe {
         /// What the coat reflects and refracts once.
         albedo: Arc<DielectricAlbedo>,
     },
+    /// As glTF's metallic-roughness model.
+    Model(Box<ModelRecipe>),
+}
+
+/// A material of a file, with what it takes to scatter light.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ModelRecipe {
+    surface: Arc<ModelSurface>,
+    facets: Arc<Albedo>,
+    sheen: Option<Arc<SheenAlbedo>>,
+    glass: Option<Arc<DielectricAlbedo>>,
+    /// Index of refraction, if light goes through it into a volume.
+    ior: Option<f64>,
+    interior: Option<Medium>,
+}
+
+impl ModelRecipe {
+    /// The BSDF at a point, with something of this index of refraction outside, and the direction of the tangent along which it is smoother.
+    pub fn at(&self, outside: f64, textures: &[Texture], surface: &Surface) -> (MetallicRoughness<'_>, DVec2) {
+        let point = self.surface.at(textures, surface);
+        let parameters = Parameters {
+            base_color: point.base_color,
+            metallic: point.metallic,
+            roughness: point.roughness,
+            ior: if self.ior.is_some() { point.ior / outside } else { point.ior },
+            specular: point.specular,
+            specular_color: point.specular_color,
+            clearcoat: point.clearcoat,
+            clearcoat_roughness: point.clearcoat_roughness,
+            sheen_color: point.sheen_color,
+            sheen_roughness: point.sheen_roughness,
+            anisotropy: point.anisotropy,
+            transmission: point.transmission,
+            volume: point.volume,
+        };
+        let glass = self.glass.as_deref().filter(|_| outside == 1.0);
+        (
+            MetallicRoughness::new(&parameters, Tables { facets: &self.facets, sheen: self.sheen.as_deref(), glass }),
+            point.anisotropy_direction,
+        )
+    }
+
+    /// Index of refraction of the inside, if there is one.
+    pub fn ior(&self) -> Option<f64> {
+        self.ior
+    }
 }
 
 /// A dielectric and what is inside.
@@ -102,19 +151,19 @@ impl Glass {
 
 impl Recipe {
     /// Of a material of the description.
-    pub fn of(material: &Description) -> Self {
+    pub fn of(material: &Description, tables: &mut SharedTables) -> Self {
         match material {
             Description::Diffuse { reflectance, texture } => Self::Diffuse { reflectance: rgb(*reflectance), texture: *texture },
             Description::Mirror { reflectance } => Self::Mirror(Mirror { reflectance: rgb(*reflectance) }),
             Description::Metal { fresnel, roughness, multiple_scattering } => {
                 let alpha = roughness.map(|roughness| roughness * roughness);
                 let rough = alpha.iter().any(|alpha| *alpha > SMOOTH_ALPHA);
-                let albedo = (*multiple_scattering && rough).then(|| Arc::new(Albedo::fixed(alpha)));
+                let albedo = (*multiple_scattering && rough).then(|| tables.fixed(alpha));
                 Self::Metal { fresnel: compiled(fresnel), alpha, albedo }
             }
             Description::Glass { ior, reflectance, transmittance, roughness, multiple_scattering, interior, priority } => {
                 let alpha = roughness * roughness;
-                let albedo = (*multiple_scattering && alpha > SMOOTH_ALPHA).then(|| Arc::new(DielectricAlbedo::fixed(*ior, [alpha; 2])));
+                let albedo = (*multiple_scattering && alpha > SMOOTH_ALPHA).then(|| tables.fixed_dielectric(*ior, alpha));
                 let (reflectance, transmittance) = (rgb(*reflectance), rgb(*transmittance));
                 let interior = interior.as_ref().and_then(Medium::compile);
                 Self::Glass(Glass { ior: *ior, reflectance, transmittance, alpha, albedo, interior, priority: *priority })
@@ -124,7 +173,7 @@ impl Recipe {
             }
             Description::Plastic { reflectance, texture, ior, roughness } => {
                 let alpha = roughness * roughness;
-                let albedo = Arc::new(DielectricAlbedo::fixed(*ior, [alpha; 2]));
+                let albedo = tables.fixed_dielectric(*ior, alpha);
                 Self::Plastic { reflectance: rgb(*reflectance), texture: *texture, alpha, albedo }
             }
             Description::Emitter { .. } => Self::Nothing,
@@ -132,11 +181,32 @@ impl Recipe {
         }
     }
 
-    /// The BSDF at a point, in empty space.
+    /// Of a material of a file, whose textures begin at `first_texture` of the scene's.
+    pub fn of_model(material: &ModelMaterial, surface: &Arc<ModelSurface>, first_texture: u32, tables: &mut SharedTables) -> Self {
+        let layers = material.transmission.is_some() || material.clearcoat.is_some() || material.sheen.is_some();
+        if material.metallic == 0.0 && material.specular.factor == 0.0 && !layers {
+            let [r, g, b, _] = material.base_color;
+            let texture = material.base_color_texture.map(|texture| first_texture + texture as u32);
+            return Self::Diffuse { reflectance: rgb([r, g, b]), texture };
+        }
+        let encloses = material.transmission.is_some() && material.volume.is_some() && material.metallic < 1.0;
+        let ior = encloses.then(|| f64::from(material.ior).max(1.0));
+        let rough = material.roughness > 0.0;
+        Self::Model(Box::new(ModelRecipe {
+            surface: Arc::clone(surface),
+            facets: tables.over_roughness(),
+            sheen: material.sheen.is_some().then(|| tables.sheen()),
+            glass: ior.filter(|_| rough).map(|ior| tables.dielectric_over_roughness(ior)),
+            ior,
+            interior: ior.and_then(|_| surface.absorption()).and_then(Medium::absorbing),
+        }))
+    }
+
+    /// The BSDF at a point, in empty space, but for those of files.
     #[inline(always)]
     pub fn bsdf(&self, material: &Material, textures: &[Texture], surface: &Surface) -> Bsdf<'_> {
         match self {
-            Self::Nothing | Self::Boundary { .. } => Bsdf::Diffuse(Diffuse { reflectance: DVec3::ZERO }),
+            Self::Nothing | Self::Boundary { .. } | Self::Model(_) => Bsdf::Diffuse(Diffuse { reflectance: DVec3::ZERO }),
             Self::Diffuse { reflectance, texture } => {
                 Bsdf::Diffuse(Diffuse { reflectance: colored(*reflectance, *texture, material, textures, surface) })
             }
@@ -156,7 +226,11 @@ impl Recipe {
     /// Whether light goes through the surface into something.
     #[inline]
     pub fn has_inside(&self) -> bool {
-        matches!(self, Self::Boundary { .. } | Self::Glass(_))
+        match self {
+            Self::Boundary { .. } | Self::Glass(_) => true,
+            Self::Model(model) => model.ior.is_some(),
+            _ => false,
+        }
     }
 
     /// What is behind the surface, if that is not empty.
@@ -164,6 +238,7 @@ impl Recipe {
     pub fn interior(&self) -> Option<&Medium> {
         match self {
             Self::Boundary { interior } | Self::Glass(Glass { interior, .. }) => interior.as_ref(),
+            Self::Model(model) => model.interior.as_ref(),
             _ => None,
         }
     }
@@ -177,7 +252,11 @@ impl Recipe {
     /// Index of refraction of the inside.
     #[inline]
     pub fn ior(&self) -> f64 {
-        if let Self::Glass(glass) = self { glass.ior } else { 1.0 }
+        match self {
+            Self::Glass(glass) => glass.ior,
+            Self::Model(model) => model.ior.unwrap_or(1.0),
+            _ => 1.0,
+        }
     }
 }
 
@@ -186,7 +265,7 @@ impl Recipe {
 fn colored(color: DVec3, texture: Option<u32>, material: &Material, textures: &[Texture], surface: &Surface) -> DVec3 {
     let mut color = color;
     if let Some(texture) = texture {
-        let [r, g, b, _] = textures[texture as usize].rgba(surface.uv);
+        let [r, g, b, _] = textures[texture as usize].at(surface.uvs());
         color *= rgb([r, g, b]);
     }
     if material.color_from_vertices {

@@ -10,6 +10,8 @@ pub use self::{
     warp::{concentric_disc, cosine_hemisphere, sin_cos_of_turn, uniform_cone, uniform_cone_pdf, uniform_sphere, uniform_triangle},
 };
 
+pub(crate) use self::sobol::mix;
+
 impl Sampler {
     /// The set of numbers for the point on the film.
     pub const FILM: u32 = 0;

@@ -10,9 +10,9 @@ use glam::{DMat3, DVec3};
 
 use crate::{
     camera::Camera,
-    description::{self, AssetSource, Frame, Fresnel, Rgb, SourceId},
+    description::{self, AssetSource, Frame, Fresnel, Render, Rgb, SourceId},
     light::{Environment, ImageEnvironment, Light, LightSampler, SunSky, turned},
-    material::{Material, Medium, rgb},
+    material::{Material, Medium, SharedTables, rgb},
     math::max_abs,
     sampling::PixelFilter,
     texture::{Image, Texture},
@@ -58,16 +58,20 @@ impl Scene {
         let camera = camera(frame)?.moved(-begin);
         let lights = frame.scene.lights.iter().map(|description| Ok(light(description)?.moved(-begin))).collect::<Result<Vec<_>>>()?;
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
-        let materials =
-            frame.scene.materials.iter().enumerate().map(|(i, m)| material(i, m, textures.len())).collect::<Result<Vec<_>>>()?;
+        let mut tables = matches!(frame.render, Render::Path { .. }).then(SharedTables::default);
+        let materials = frame.scene.materials.iter().enumerate();
+        let materials = materials.map(|(i, m)| material(i, m, textures.len(), tables.as_mut())).collect::<Result<Vec<_>>>()?;
         let medium = frame.scene.medium.as_ref();
         medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("the scene: {error}")))?;
         let medium = medium.and_then(Medium::compile);
         let (environment, sun) = environment(&frame.scene.background, assets)?;
         let mut lights = lights;
         lights.extend(sun);
-        let mut placed = Placer::new(&frame.scene, -begin, assets, materials, textures).place()?;
-        let (emitters, hidden) = emitters(&placed.geometry, &placed.materials);
+        let mut placed = Placer::new(&frame.scene, -begin, assets, materials, textures, tables).place()?;
+        for description in &placed.lights {
+            lights.push(light(description)?);
+        }
+        let (emitters, hidden) = emitters(&placed.geometry, &placed.materials, &placed.textures);
         if hidden > 0 {
             let message = format!(
                 "{hidden} objects shine that light is not sampled from (cones, cylinders, planes, unevenly scaled spheres): their light is noisy"
@@ -203,7 +207,7 @@ fn texture(texture: &description::Texture, assets: &dyn AssetSource) -> Result<T
     Texture::compile(texture, assets).map_err(|error| CompileError::asset(source, error))
 }
 
-fn material(index: usize, material: &description::Material, textures: usize) -> Result<Material> {
+fn material(index: usize, material: &description::Material, textures: usize, tables: Option<&mut SharedTables>) -> Result<Material> {
     use description::Material::{Boundary, Diffuse, Emitter, Glass, Metal, Mirror, Plastic, RoughDiffuse};
     let wrong = |what: &str| Err(CompileError::new(SourceId::default(), format!("material {index}: {what}")));
     let (colors, texture, roughness, ior, medium): (&[&Rgb], _, &[f64], _, _) = match material {
@@ -234,7 +238,7 @@ fn material(index: usize, material: &description::Material, textures: usize) -> 
         return wrong("its colours must be finite and not negative");
     }
     medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("material {index}: {error}")))?;
-    Ok(Material::compile(material))
+    Ok(Material::compile(material, tables))
 }
 
 fn check_medium(medium: &description::Medium) -> std::result::Result<(), &'static str> {

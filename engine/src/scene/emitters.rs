@@ -1,16 +1,17 @@
 //! Which surfaces of a scene shine.
 
-use glam::{DMat3, DVec3};
+use glam::{DMat3, DVec2, DVec3};
 
-use super::geometry::{Geometry, LocalShape, Transform};
+use super::geometry::{Geometry, LocalShape, Mesh, Transform};
 use crate::{
     light::{Area, Emitter},
-    material::{Emission, Material},
+    material::{Emission, Material, rgb},
     shape::{Cuboid, Disc, Other, Rectangle, Sphere},
+    texture::Texture,
 };
 
 /// All surfaces that shine and whose points can be chosen at random, and how many objects shine of which that is not so: rays have to find those by themselves.
-pub fn emitters(geometry: &Geometry, materials: &[Material]) -> (Vec<Emitter>, usize) {
+pub fn emitters(geometry: &Geometry, materials: &[Material], textures: &[Texture]) -> (Vec<Emitter>, usize) {
     let mut found = Found { materials, emitters: Vec::new(), left_out: 0 };
     geometry.spheres.iter().for_each(|s| found.sphere(s.material, s.object, s.shape));
     geometry.discs.iter().for_each(|d| found.disc(d.material, d.object, d.shape));
@@ -41,13 +42,18 @@ pub fn emitters(geometry: &Geometry, materials: &[Material]) -> (Vec<Emitter>, u
             LocalShape::Other(Other::Cone(_)) => found.none(material),
         }
     }
-    for placed in geometry.instances.iter().filter(|placed| materials[placed.material as usize].emission.is_some()) {
+    for placed in &geometry.instances {
+        let Some(emission) = materials[placed.material as usize].emission.filter(|emission| emission.is_light) else { continue };
         let mesh = &geometry.meshes[placed.shape.mesh as usize];
         let transform = &placed.shape.transform;
         for triangle in 0..mesh.triangles.count() as u32 {
             let [a, b, c] = mesh.triangles.vertices(triangle).map(|p| transform.to_world.transform_point3(p));
             let area = Area::Triangle { corner: a, edges: [b - a, c - a] };
-            found.add(placed.material, area, is_mirrored(transform), placed.object, triangle);
+            let radiance = match emission.texture {
+                Some(texture) => emission.radiance * mean(&textures[texture as usize], mesh, triangle),
+                None => emission.radiance,
+            };
+            found.add_of(placed.material, radiance, area, is_mirrored(transform), placed.object, triangle);
         }
     }
     (found.emitters, found.left_out)
@@ -106,13 +112,41 @@ impl Found<'_> {
     }
 
     fn add(&mut self, material: u32, area: Area, mirrored: bool, object: u32, part: u32) {
+        if let Some(Emission { radiance, .. }) = self.materials[material as usize].emission {
+            self.add_of(material, radiance, area, mirrored, object, part);
+        }
+    }
+
+    /// The same with a mean radiance of its own.
+    fn add_of(&mut self, material: u32, radiance: DVec3, area: Area, mirrored: bool, object: u32, part: u32) {
         let material = &self.materials[material as usize];
-        let Some(Emission { radiance, texture, two_sided }) = material.emission else { return };
+        let Some(Emission { texture, two_sided, is_light: true, .. }) = material.emission else { return };
         let Some(emitter) = Emitter::new(area, radiance, two_sided, object, part) else { return };
         let mut emitter = if mirrored { emitter.turned() } else { emitter };
         emitter.textured = texture.is_some() || material.is_masked() || !material.double_sided;
         self.emitters.push(emitter);
     }
+}
+
+/// About the mean colour of a texture on a triangle: of the middles of 16 smaller triangles. Where it is black, only rays that go there by chance find what
+/// light there may be.
+fn mean(texture: &Texture, mesh: &Mesh, triangle: u32) -> DVec3 {
+    const STEPS: u32 = 4;
+    let corners = mesh.triangles.indices(triangle).map(|vertex| mesh.uvs_of(vertex));
+    let at = |weights: [f64; 3]| -> [DVec2; 2] {
+        std::array::from_fn(|set| corners[0][set] * weights[0] + corners[1][set] * weights[1] + corners[2][set] * weights[2])
+    };
+    let mut sum = DVec3::ZERO;
+    for row in 0..STEPS {
+        // Triangles that stand upright, and those between that stand on their head.
+        for column in 0..2 * (STEPS - row) - 1 {
+            let shift = if column % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
+            let (b, c) = ((f64::from(column / 2) + shift) / f64::from(STEPS), (f64::from(row) + shift) / f64::from(STEPS));
+            let [r, g, b, _] = texture.at(at([1.0 - b - c, b, c]));
+            sum += rgb([r, g, b]);
+        }
+    }
+    sum / f64::from(STEPS * STEPS)
 }
 
 /// Whether it turns what is left into what is right: edges then span a normal on the other side than that of the surface.

@@ -7,6 +7,7 @@ use crate::{
     light::Light,
     math::{UNIT, max_abs},
     shape::{Bounds, Cuboid, Disc, Other, Plane, Ray, Sphere, triangle::geometric_normal},
+    texture::Coordinates,
 };
 
 /// A shape in world coordinates.
@@ -63,6 +64,9 @@ pub struct Mesh {
     pub tree: Option<Tree>,
     pub normals: Vec<[f32; 3]>,
     pub uvs: Vec<[f32; 2]>,
+    pub second_uvs: Vec<[f32; 2]>,
+    /// Unit tangents or 0, and the side of the bitangent.
+    pub tangents: Vec<[f32; 4]>,
     pub colors: Vec<[f32; 4]>,
 }
 
@@ -231,9 +235,35 @@ impl Mesh {
         MeshPoint { position, error: 16.0 * UNIT * size, ng, ns }
     }
 
-    /// Texture coordinates at a hit; 0 where there are none.
-    pub fn uv(&self, hit: &MeshHit) -> DVec2 {
-        if self.uvs.is_empty() { DVec2::ZERO } else { self.interpolate(hit, |i| Vec2::from(self.uvs[i]).as_dvec2()) }
+    /// Both sets of texture coordinates at a hit; 0 where there are none.
+    pub fn uvs_at(&self, hit: &MeshHit) -> [DVec2; 2] {
+        [&self.uvs, &self.second_uvs].map(|uvs| match uvs.is_empty() {
+            true => DVec2::ZERO,
+            false => self.interpolate(hit, |i| Vec2::from(uvs[i]).as_dvec2()),
+        })
+    }
+
+    /// Both sets of texture coordinates at a vertex; 0 where there are none.
+    pub fn uvs_of(&self, vertex: usize) -> [DVec2; 2] {
+        [&self.uvs, &self.second_uvs].map(|uvs| uvs.get(vertex).map_or(DVec2::ZERO, |uv| Vec2::from(*uv).as_dvec2()))
+    }
+
+    /// Along u of a texture with these coordinates, and to the upper side of its image, of any length; 0 where nothing tells them. Vertices have them,
+    /// or else they are those of the triangle (Akenine-Moeller et al., "Real-Time Rendering", 4th ed., 16.3).
+    pub fn tangents_at(&self, hit: &MeshHit, normal: DVec3, coordinates: &Coordinates) -> [DVec3; 2] {
+        if !self.tangents.is_empty() {
+            let tangent = self.interpolate(hit, |i| Vec4::from(self.tangents[i]).as_dvec4());
+            if tangent.truncate() != DVec3::ZERO {
+                return [tangent.truncate(), normal.cross(tangent.truncate()) * tangent.w];
+            }
+        }
+        let [a, b, c] = self.triangles.vertices(hit.triangle);
+        let [uv_a, uv_b, uv_c] = self.triangles.indices(hit.triangle).map(|i| coordinates.of(self.uvs_of(i)));
+        let ([to_b, to_c], [uv_to_b, uv_to_c]) = ([b - a, c - a], [uv_b - uv_a, uv_c - uv_a]);
+        // Of the determinant only the sign matters; v runs downwards.
+        let determinant = uv_to_b.x * uv_to_c.y - uv_to_b.y * uv_to_c.x;
+        let sign = if determinant == 0.0 { 0.0 } else { determinant.signum() };
+        [(to_b * uv_to_c.y - to_c * uv_to_b.y) * sign, (to_b * uv_to_c.x - to_c * uv_to_b.x) * sign]
     }
 
     /// Colour and opacity at a hit; 1 where there are none.
@@ -248,7 +278,11 @@ impl Mesh {
 
     /// Memory in bytes.
     pub fn bytes(&self) -> usize {
-        let carried = size_of_val(&*self.normals) + size_of_val(&*self.uvs) + size_of_val(&*self.colors);
+        let carried = size_of_val(&*self.normals)
+            + size_of_val(&*self.uvs)
+            + size_of_val(&*self.second_uvs)
+            + size_of_val(&*self.tangents)
+            + size_of_val(&*self.colors);
         self.triangles.bytes() + self.tree.as_ref().map_or(0, Tree::bytes) + carried
     }
 }

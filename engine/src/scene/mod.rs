@@ -7,6 +7,7 @@ mod forest;
 mod geometry;
 mod identity;
 mod inside;
+mod models;
 mod outlined;
 mod place;
 mod query;

@@ -7,18 +7,19 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::{
     error::{CompileError, Warning},
     geometry::{Geometry, Instance, LocalShape, Mesh, Placed, Transform, Transformed, kind},
+    models::PlacedModel,
 };
 use crate::{
     accel::{Simd, Triangles},
     assets,
     description::{self, AssetId, AssetSource, GroupId, MaterialId, Matrix, MeshData, Model, Object, ObjectKind, Shape, SourceId},
-    material::Material,
+    material::{Material, SharedTables},
     math::max_abs,
     shape::{Bounds, Cone, Cuboid, Disc, Other, Plane, Rectangle, Sphere},
     texture::Texture,
 };
 
-type Result<T> = std::result::Result<T, CompileError>;
+pub(super) type Result<T> = std::result::Result<T, CompileError>;
 
 /// Largest coordinate of anything that is placed: squares of distances, and products of these, stay numbers.
 pub(super) const FARTHEST: f64 = 1e75;
@@ -26,21 +27,12 @@ pub(super) const FARTHEST: f64 = 1e75;
 /// Deepest nesting of groups.
 const DEEPEST: usize = 64;
 
-/// A model that has been read: its meshes, and where its materials begin.
-struct PlacedModel {
-    /// Index of each of its meshes in the geometry; `None` where it has no triangles.
-    meshes: Vec<Option<u32>>,
-    /// Index in the scene of each mesh's material.
-    materials: Vec<u32>,
-    instances: Vec<assets::Instance>,
-}
-
 /// Fills a scene's tables.
 pub struct Placer<'a> {
     scene: &'a description::Scene,
-    assets: &'a dyn AssetSource,
+    pub(super) assets: &'a dyn AssetSource,
     script_meshes: BTreeMap<AssetId, u32>,
-    models: Vec<(&'a Model, Rc<PlacedModel>)>,
+    pub(super) models: Vec<(&'a Model, Rc<PlacedModel>)>,
     objects: u32,
     /// Objects of each group and of those within it: groups of groups come to more than time allows before memory ends.
     unfolded: Vec<u64>,
@@ -50,8 +42,12 @@ pub struct Placer<'a> {
     pub textures: Vec<Texture>,
     /// See `materials`.
     pub geometry: Geometry,
+    /// The lights of models, in the scene's coordinates.
+    pub lights: Vec<description::Light>,
     /// What a user should know.
     pub warnings: Vec<Warning>,
+    /// What materials share; `None` for those to whom light is simple.
+    pub(super) tables: Option<SharedTables>,
 }
 
 impl<'a> Placer<'a> {
@@ -62,6 +58,7 @@ impl<'a> Placer<'a> {
         assets: &'a dyn AssetSource,
         materials: Vec<Material>,
         textures: Vec<Texture>,
+        tables: Option<SharedTables>,
     ) -> Self {
         let geometry = Geometry {
             origin,
@@ -91,7 +88,9 @@ impl<'a> Placer<'a> {
             materials,
             textures,
             geometry,
+            lights: Vec::new(),
             warnings: Vec::new(),
+            tables,
         }
     }
 
@@ -239,7 +238,7 @@ impl<'a> Placer<'a> {
         Ok(())
     }
 
-    fn instance(&mut self, mesh: u32, material: u32, transform: Transform, source: SourceId) -> Result<()> {
+    pub(super) fn instance(&mut self, mesh: u32, material: u32, transform: Transform, source: SourceId) -> Result<()> {
         let object = self.next_object(source)?;
         check_reach(transform.reach(self.geometry.meshes[mesh as usize].triangles.bounds()), source)?;
         let surface = &self.materials[material as usize];
@@ -248,64 +247,19 @@ impl<'a> Placer<'a> {
         Ok(())
     }
 
-    fn model(&mut self, model: &'a Model, material: Option<MaterialId>, transform: Transform, source: SourceId) -> Result<()> {
-        let known = self.models.iter().find(|(known, _)| *known == model).map(|(_, placed)| Rc::clone(placed));
-        let placed = match known {
-            Some(placed) => placed,
-            None => {
-                let placed = Rc::new(self.read_model(model, source)?);
-                self.models.push((model, Rc::clone(&placed)));
-                placed
-            }
-        };
-        for instance in &placed.instances {
-            let Some(mesh) = placed.meshes[instance.mesh] else { continue };
-            let Some(transform) = Transform::new(transform.to_world * instance.transform) else {
-                let message = "a part of the model is scaled to nothing and left out".into();
-                self.warn(source, message);
-                continue;
-            };
-            let material = material.unwrap_or(placed.materials[instance.mesh]);
-            self.instance(mesh, material, transform, source)?;
-        }
-        Ok(())
-    }
-
-    fn read_model(&mut self, model: &Model, source: SourceId) -> Result<PlacedModel> {
-        let loaded = assets::load(model, self.assets).map_err(|error| CompileError::asset(source, error))?;
-        let (first_material, first_texture) = (self.materials.len() as u32, self.textures.len() as u32);
-        self.materials.extend(loaded.materials.iter().map(|material| Material::from_model(material, first_texture)));
-        self.textures.extend(loaded.textures);
-        for message in loaded.warnings {
-            self.warn(source, message);
-        }
-        let materials = loaded.meshes.iter().map(|mesh| first_material + mesh.material as u32).collect();
-        let mut meshes = Vec::with_capacity(loaded.meshes.len());
-        for mesh in loaded.meshes {
-            let assets::Mesh { positions, triangles, normals, uvs, colors, .. } = mesh;
-            meshes.push((!triangles.is_empty()).then(|| self.add_mesh(positions, triangles, normals, uvs, colors)));
-        }
-        Ok(PlacedModel { meshes, materials, instances: loaded.instances })
-    }
-
     fn read_mesh(&mut self, id: AssetId, source: SourceId) -> Result<u32> {
         let wrong = |message: String| CompileError::new(source, message);
         let bytes = self.assets.bytes(id).ok_or_else(|| wrong(format!("the mesh's data ({id}) is not here")))?;
         let data: MeshData = postcard::from_bytes(&bytes).map_err(|error| wrong(format!("the mesh's data is damaged: {error}")))?;
         check_mesh(&data).map_err(wrong)?;
         let MeshData { positions, triangles, normals, uvs } = data;
-        Ok(self.add_mesh(positions, triangles, normals, uvs, Vec::new()))
+        Ok(self.add_mesh(assets::Mesh { positions, triangles, normals, uvs, ..assets::Mesh::default() }))
     }
 
-    fn add_mesh(
-        &mut self,
-        positions: Vec<[f32; 3]>,
-        triangles: Vec<[u32; 3]>,
-        normals: Vec<[f32; 3]>,
-        uvs: Vec<[f32; 2]>,
-        colors: Vec<[f32; 4]>,
-    ) -> u32 {
-        self.geometry.meshes.push(Mesh { triangles: Triangles::new(positions, triangles), tree: None, normals, uvs, colors });
+    pub(super) fn add_mesh(&mut self, mesh: assets::Mesh) -> u32 {
+        let assets::Mesh { positions, triangles, normals, uvs, second_uvs, tangents, colors, .. } = mesh;
+        let triangles = Triangles::new(positions, triangles);
+        self.geometry.meshes.push(Mesh { triangles, tree: None, normals, uvs, second_uvs, tangents, colors });
         self.geometry.meshes.len() as u32 - 1
     }
 
@@ -317,7 +271,7 @@ impl<'a> Placer<'a> {
         Ok(self.objects - 1)
     }
 
-    fn warn(&mut self, source: SourceId, message: String) {
+    pub(super) fn warn(&mut self, source: SourceId, message: String) {
         let warning = Warning { source, message };
         if !self.warnings.contains(&warning) {
             self.warnings.push(warning);

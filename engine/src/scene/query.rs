@@ -2,19 +2,21 @@
 
 use std::ops::ControlFlow;
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::{
     Scene,
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
-    surface::{Crossing, Surface},
+    surface::{Crossing, Surface, in_world},
     tracer::{Tracer, Work},
 };
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
     accel::{Lanes, MeshHit, OTHER, Pencil, Simd},
+    description::Render,
+    sampling::mix,
     shape::{Point, Ray, Sphere, triangle::TriangleHit},
 };
 
@@ -269,8 +271,10 @@ impl Scene {
         }
         let Some(cutoff) = material.alpha_cutoff else { return true };
         let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
-        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].rgba(mesh.uv(hit))[3]);
-        material.base_alpha * texture * mesh.color(hit)[3] >= cutoff
+        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].at(mesh.uvs_at(hit))[3]);
+        let alpha = material.base_alpha * texture * mesh.color(hit)[3];
+        let blends = material.blends && matches!(self.render, Render::Path { .. });
+        if blends { f64::from(alpha) > chance(hit) } else { alpha >= cutoff }
     }
 
     /// The surface at a hit. All of it is inlined, so that no surface is handed over in memory: that would take longer than computing it.
@@ -346,7 +350,11 @@ impl Scene {
             // Perpendicular, zero or NaN.
             _ => ng,
         };
-        let uv = if self.is_textured(placed.material) { mesh.uv(&at) } else { DVec2::ZERO };
+        let material = &self.materials[placed.material as usize];
+        let [uv, uv2] = if material.is_textured() { mesh.uvs_at(&at) } else { [DVec2::ZERO; 2] };
+        let tangents = material.tangents.as_ref().map_or([DVec3::ZERO; 2], |coordinates| {
+            mesh.tangents_at(&at, local.ns, coordinates).map(|tangent| transform.to_world.transform_vector3(tangent))
+        });
         let error = transform.error(local.error, local.position, point);
         Surface {
             point,
@@ -355,6 +363,8 @@ impl Scene {
             ng,
             ns,
             uv,
+            uv2,
+            tangents,
             color: mesh.color(&at),
             material: placed.material,
             object: hit.object,
@@ -377,9 +387,10 @@ impl Scene {
     }
 }
 
-#[inline(always)]
-fn in_world(point: Point, hit: &Hit, material: u32) -> Surface {
-    let Point { position, error, normal, uv } = point;
-    let Hit { t, object, part, .. } = *hit;
-    Surface { point: position, t, error, ng: normal, ns: normal, uv, color: [1.0; 4], material, object, part, sphere: 0 }
+/// A number in [0, 1) that depends on the place of a hit, down to its last bit: as if at random, a surface is there for as many rays as its opacity says (Enderton, Sintorn,
+/// Shirley, Luebke, "Stochastic Transparency", 2010).
+fn chance(hit: &MeshHit) -> f64 {
+    let bits = [hit.at.t, hit.at.b1, hit.at.b2].map(f64::to_bits);
+    let mixed = bits.into_iter().fold(u64::from(hit.triangle), |state, bits| mix(state ^ bits));
+    (mixed >> 11) as f64 / (1_u64 << 53) as f64
 }

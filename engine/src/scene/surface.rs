@@ -2,7 +2,8 @@
 
 use glam::{DVec2, DVec3};
 
-use crate::shape::Ray;
+use super::query::Hit;
+use crate::shape::{Point, Ray};
 
 /// The surface at a hit, in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,6 +20,10 @@ pub struct Surface {
     pub ns: DVec3,
     /// Texture coordinates; (0, 0) where the material has no texture or the mesh no coordinates.
     pub uv: DVec2,
+    /// The second set of them, where the mesh has two; else (0, 0).
+    pub uv2: DVec2,
+    /// Along u, and to the upper side of the image, of any length; 0 where the material does not ask for them or nothing tells them.
+    pub tangents: [DVec3; 2],
     /// Vertex colour and opacity; 1 where there is none.
     pub color: [f32; 4],
     /// Index into [`super::Scene::materials`].
@@ -32,6 +37,23 @@ pub struct Surface {
 }
 
 impl Surface {
+    /// Both sets of texture coordinates.
+    #[inline(always)]
+    pub fn uvs(&self) -> [DVec2; 2] {
+        [self.uv, self.uv2]
+    }
+
+    /// Tangent and bitangent as unit vectors that are perpendicular to a unit normal and to each other; of either handedness, as images may be mirrored.
+    /// `None` where there are none.
+    #[inline]
+    pub fn tangents_across(&self, normal: DVec3) -> Option<(DVec3, DVec3)> {
+        let [along, up] = self.tangents;
+        let along = along.try_normalize()?;
+        let tangent = (along - normal * normal.dot(along)).try_normalize()?;
+        let bitangent = normal.cross(tangent);
+        Some((tangent, if bitangent.dot(up) < 0.0 { -bitangent } else { bitangent }))
+    }
+
     /// A ray without end that leaves the surface along a unit vector, on whichever side that leads to.
     #[inline]
     pub fn spawn(&self, direction: DVec3) -> Ray {
@@ -62,4 +84,26 @@ impl Surface {
 pub struct Crossing {
     /// Parameter of the ray: the distance, as its direction is a unit vector.
     pub t: f64,
+}
+
+/// The surface of anything but a mesh.
+#[inline(always)]
+pub(super) fn in_world(point: Point, hit: &Hit, material: u32) -> Surface {
+    let Point { position, error, normal, uv } = point;
+    let Hit { t, object, part, .. } = *hit;
+    Surface {
+        point: position,
+        t,
+        error,
+        ng: normal,
+        ns: normal,
+        uv,
+        uv2: DVec2::ZERO,
+        tangents: [DVec3::ZERO; 2],
+        color: [1.0; 4],
+        material,
+        object,
+        part,
+        sphere: 0,
+    }
 }

@@ -1,5 +1,6 @@
 //! Textures, compiled: a colour for every uv.
 
+mod coordinates;
 mod image;
 mod srgb;
 mod wrap;
@@ -10,7 +11,11 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-pub use self::{image::Image, srgb::srgb_to_linear};
+pub use self::{
+    coordinates::{Coordinates, texture_transform},
+    image::Image,
+    srgb::srgb_to_linear,
+};
 
 use crate::description::{self, AssetError, AssetSource, Rgb, Wrap};
 
@@ -32,6 +37,8 @@ pub enum Texture {
         image: Arc<Image>,
         /// What lies beyond u in [0, 1] and v in [0, 1].
         wrap: [Wrap; 2],
+        /// Which coordinates of a surface it takes.
+        coordinates: Coordinates,
     },
 }
 
@@ -45,12 +52,29 @@ impl Texture {
             description::Texture::Checker { even, odd, size } => Ok(Self::Checker { even: *even, odd: *odd, size: *size }),
             description::Texture::Image { file, color_space, wrap, .. } => {
                 let bytes = assets.bytes(*file).ok_or_else(|| AssetError::new(format!("the image's bytes ({file}) are not here")))?;
-                Ok(Self::Image { image: Arc::new(Image::decode(&bytes, *color_space)?), wrap: *wrap })
+                Ok(Self::Image { image: Arc::new(Image::decode(&bytes, *color_space)?), wrap: *wrap, coordinates: Coordinates::default() })
             }
         }
     }
 
-    /// The colour at `uv` (finite): linear Rec. 709, and opacity in [0, 1].
+    /// The colour at a point of a surface whose texture coordinates are these (finite): see [`Self::rgba`].
+    #[inline]
+    pub fn at(&self, uvs: [DVec2; 2]) -> [f32; 4] {
+        match self {
+            Self::Checker { .. } => self.rgba(uvs[0]),
+            Self::Image { coordinates, .. } => self.rgba(coordinates.of(uvs)),
+        }
+    }
+
+    /// Which coordinates of a surface it takes.
+    pub fn coordinates(&self) -> Coordinates {
+        match self {
+            Self::Checker { .. } => Coordinates::default(),
+            Self::Image { coordinates, .. } => *coordinates,
+        }
+    }
+
+    /// The colour at its own coordinates `uv` (finite): linear Rec. 709, and opacity in [0, 1].
     #[inline]
     pub fn rgba(&self, uv: DVec2) -> [f32; 4] {
         match self {
@@ -60,7 +84,7 @@ impl Texture {
                 let [r, g, b] = if (square * 0.5).floor() == square * 0.5 { *even } else { *odd };
                 [r, g, b, 1.0]
             }
-            Self::Image { image, wrap } => bilinear(image, *wrap, uv),
+            Self::Image { image, wrap, .. } => bilinear(image, *wrap, uv),
         }
     }
 

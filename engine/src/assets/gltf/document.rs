@@ -13,8 +13,23 @@ use super::AssetError;
 /// Extensions without which a file is still read right, or that only describe looks which a warning names.
 const READABLE: [&str; 4] = ["KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
 
-/// Extensions that are modelled in full.
-pub(super) const MODELLED: [&str; 2] = ["KHR_texture_transform", "KHR_mesh_quantization"];
+/// Extensions of which no warning is needed because they are there.
+pub(super) const MODELLED: [&str; 13] = [
+    "KHR_lights_punctual",
+    "KHR_materials_anisotropy",
+    "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength",
+    "KHR_materials_ior",
+    "KHR_materials_sheen",
+    "KHR_materials_specular",
+    "KHR_materials_transmission",
+    "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    "KHR_texture_transform",
+    "KHR_xmp_json_ld",
+    // Each material that asks for it is named.
+    "KHR_materials_unlit",
+];
 
 /// A glTF file, taken apart.
 pub(super) struct Document<'a> {

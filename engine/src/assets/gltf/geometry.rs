@@ -1,5 +1,6 @@
 //! Primitives: triangles and their attributes, of the vertices that the triangles use.
 
+use glam::DVec3;
 use gltf::json::{
     Accessor, Index, Root,
     accessor::Type,
@@ -8,7 +9,13 @@ use gltf::json::{
 };
 
 use super::{AssetError, accessor::Reader, buffer::Buffers, material::Materials};
-use crate::assets::{Mesh, files::Context, mesh::fraction, normals::normalize, warnings::Warnings};
+use crate::assets::{
+    Mesh,
+    files::Context,
+    mesh::fraction,
+    normals::{normalize, unit},
+    warnings::Warnings,
+};
 
 /// Triangles that a file may make of each of its bytes, together with a fixed number: strips of byte indices make 1, and meshes may share them.
 const TRIANGLES_PER_BYTE: usize = 4;
@@ -83,7 +90,7 @@ impl<'a> Geometry<'a> {
                 reader => Ok(reader),
             }
         };
-        let quoted = format!("{:?}", mesh.name);
+        let (quoted, count_used) = (format!("{:?}", mesh.name), mesh.positions.len());
         if let Some(normals) = reader(Semantic::Normals, &[Type::Vec3])? {
             mesh.normals = used.iter().map(|index| normals.floats(index, 0.0)).collect();
             if normalize(mesh) > 0 {
@@ -91,20 +98,28 @@ impl<'a> Geometry<'a> {
             }
         }
         mesh.material = primitive.material.map_or(self.materials.materials.len() - 1, |material| material.value());
-        let Some(material) = self.materials.materials.get(mesh.material) else {
+        let (Some(material), Some(sets)) = (self.materials.materials.get(mesh.material), self.materials.sets.get(mesh.material)) else {
             return Err(AssetError::new(format!("material {} does not exist (there are {})", mesh.material, self.root.materials.len())));
         };
-        let coordinates = &self.materials.coordinates[mesh.material];
-        if let Some(uvs) = reader(Semantic::TexCoords(coordinates.set), &[Type::Vec2])? {
-            mesh.uvs = used.iter().map(|index| coordinates.apply(uvs.floats(index, 0.0))).collect();
-            mesh.uvs.iter_mut().flatten().filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
-        } else if material.texture.is_some() {
-            mesh.uvs = vec![coordinates.apply([0.0; 2]); mesh.positions.len()];
-            warnings.object(
-                "mesh",
-                quoted.clone(),
-                format!("has a texture, but no TEXCOORD_{}; drawn in one of its colours", coordinates.set),
-            );
+        let mut coordinates = |set: u32, wanted: bool| -> Result<Vec<[f32; 2]>, AssetError> {
+            let Some(uvs) = reader(Semantic::TexCoords(set), &[Type::Vec2])? else {
+                if wanted {
+                    let text = format!("has a texture, but no TEXCOORD_{set}; drawn in one of its colours");
+                    warnings.object("mesh", quoted.clone(), text);
+                }
+                return Ok(vec![[0.0; 2]; if wanted { count_used } else { 0 }]);
+            };
+            Ok(used.iter().map(|index| uvs.floats(index, 0.0).map(|x| if x.is_finite() { x } else { 0.0 })).collect())
+        };
+        // A material of the user's own may ask for coordinates where the file's does not.
+        mesh.uvs = coordinates(sets.first().copied().unwrap_or(0), !sets.is_empty())?;
+        if let Some(&second) = sets.get(1) {
+            mesh.second_uvs = coordinates(second, true)?;
+        }
+        if material.needs_tangents()
+            && let Some(tangents) = reader(Semantic::Tangents, &[Type::Vec4])?
+        {
+            mesh.tangents = used.iter().map(|index| tangent(tangents.floats(index, 1.0))).collect();
         }
         if let Some(colors) = reader(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? {
             let colors = colors.normalized();
@@ -166,6 +181,12 @@ impl<'a> Geometry<'a> {
         let flat = number - triangles.len();
         Ok((triangles, flat))
     }
+}
+
+/// A tangent made unit, or 0 if it has no direction, and the side of the bitangent.
+fn tangent([x, y, z, side]: [f32; 4]) -> [f32; 4] {
+    let [x, y, z] = unit(DVec3::new(x.into(), y.into(), z.into())).unwrap_or([0.0; 3]);
+    [x, y, z, if side < 0.0 { -1.0 } else { 1.0 }]
 }
 
 /// The vertices that a mesh uses, in rising order.

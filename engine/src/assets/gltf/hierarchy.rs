@@ -1,4 +1,4 @@
-//! The node hierarchy: which mesh appears where.
+//! The node hierarchy: which mesh and which light appears where.
 
 use glam::{DAffine3, DMat3, DVec3};
 use gltf::json::{Index, Node, Root};
@@ -6,19 +6,30 @@ use gltf::json::{Index, Node, Root};
 use super::{
     AssetError,
     document::{at, label},
+    lights,
 };
 use crate::assets::{files::Context, warnings::Warnings};
 
-/// A mesh of the file at a place, mesh to model coordinates.
+/// A thing of the file at a place, from its own to model coordinates.
 pub(super) struct Placement {
-    /// Index of the mesh in the file.
-    pub mesh: usize,
+    /// Its index in the file.
+    pub index: usize,
+    /// Finite.
     pub transform: DAffine3,
 }
 
-/// All meshes of the default scene in depth-first order. Without a default scene that is the first one, or all root nodes where there is none.
-pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Placement>, AssetError> {
-    let mut placements = Vec::new();
+/// Everything at its place.
+#[derive(Default)]
+pub(super) struct Placements {
+    /// Under transforms that can be inverted.
+    pub meshes: Vec<Placement>,
+    /// The indices may be wrong.
+    pub lights: Vec<Placement>,
+}
+
+/// All meshes and lights of the default scene in depth-first order. Without a default scene that is the first one, or all root nodes where there is none.
+pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Placements, AssetError> {
+    let mut placements = Placements::default();
     let mut visited = vec![false; root.nodes.len()];
     // A stack of its own: a chain of a million nodes must not overflow the thread's.
     let mut stack: Vec<(Index<Node>, DAffine3)> = roots(root, warnings)?.into_iter().rev().map(|node| (node, DAffine3::IDENTITY)).collect();
@@ -29,17 +40,19 @@ pub(super) fn placements(root: &Root, warnings: &mut Warnings) -> Result<Vec<Pla
             return Err(AssetError::new("has two parents, or is its own ancestor")).context(context);
         }
         let transform = parent * local(node).context(context)?;
+        let light = lights::of_node(node).context(context)?;
+        let determinant = transform.matrix3.determinant();
+        if (node.mesh.is_some() || light.is_some()) && !(transform.is_finite() && determinant.is_finite()) {
+            return Err(AssetError::new("its transform is not finite")).context(context);
+        }
         if let Some(mesh) = node.mesh {
             at(&root.meshes, mesh, "mesh").context(context)?;
-            let determinant = transform.matrix3.determinant();
-            if !transform.is_finite() || !determinant.is_finite() {
-                return Err(AssetError::new("its transform is not finite")).context(context);
-            }
             match determinant == 0.0 {
                 true => warnings.object("node", name(node, index), "is scaled to nothing; left out"),
-                false => placements.push(Placement { mesh: mesh.value(), transform }),
+                false => placements.meshes.push(Placement { index: mesh.value(), transform }),
             }
         }
+        placements.lights.extend(light.map(|index| Placement { index, transform }));
         if node.skin.is_some() {
             warnings.object("node", name(node, index), "skinning is not modelled; drawn as the mesh is stored");
         }

@@ -7,6 +7,7 @@ mod buffer;
 mod document;
 mod geometry;
 mod hierarchy;
+mod lights;
 mod material;
 
 use std::ops::Range;
@@ -21,6 +22,7 @@ use self::{
     buffer::Buffers,
     document::{Document, MODELLED, label},
     geometry::Geometry,
+    material::Materials,
 };
 use super::{
     AssetError, Instance, LoadedModel, Mesh,
@@ -42,18 +44,19 @@ pub(super) fn load(files: &Files<'_>) -> Result<LoadedModel, AssetError> {
     let materials = material::load(root, &buffers, files, &mut warnings)?;
     let placements = hierarchy::placements(root, &mut warnings)?;
 
+    let lights = lights::lights(root, &placements.lights, &mut warnings)?;
     let mut geometry = Geometry::new(root, &buffers, &materials);
     let mut meshes = Vec::new();
     let mut instances = Vec::new();
     // Which meshes of the model a mesh of the file became, when a node first showed it.
     let mut known: Vec<Option<Range<usize>>> = vec![None; root.meshes.len()];
-    for placement in placements {
-        let range = match &known[placement.mesh] {
+    for placement in placements.meshes {
+        let range = match &known[placement.index] {
             Some(range) => range.clone(),
             None => {
                 let first = meshes.len();
-                read_mesh(&root.meshes[placement.mesh], placement.mesh, &mut geometry, &mut meshes, &mut warnings)?;
-                known[placement.mesh].insert(first..meshes.len()).clone()
+                read_mesh(&root.meshes[placement.index], placement.index, &mut geometry, &mut meshes, &mut warnings)?;
+                known[placement.index].insert(first..meshes.len()).clone()
             }
         };
         if instances.len() + range.len() > MAX_INSTANCES {
@@ -61,10 +64,11 @@ pub(super) fn load(files: &Files<'_>) -> Result<LoadedModel, AssetError> {
         }
         instances.extend(range.map(|mesh| Instance { mesh, transform: placement.transform }));
     }
-    if instances.is_empty() {
+    if instances.is_empty() && lights.is_empty() {
         return Err(AssetError::new("has no triangles in its scene"));
     }
-    Ok(LoadedModel { meshes, instances, materials: materials.materials, textures: materials.textures, warnings: warnings.into_texts() })
+    let Materials { materials, textures, .. } = materials;
+    Ok(LoadedModel { meshes, instances, materials, textures, lights, warnings: warnings.into_texts() })
 }
 
 /// Appends a mesh for each primitive that has something to draw.
@@ -84,7 +88,7 @@ fn read_mesh(
     Ok(())
 }
 
-/// Names of the files that a glTF file needs: buffers, and images of base colours.
+/// Names of the files that a glTF file needs: buffers and images.
 pub(super) fn references(bytes: &[u8]) -> Result<Vec<String>, AssetError> {
     let document = Document::parse(bytes)?;
     let root = &document.root;

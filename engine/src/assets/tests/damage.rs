@@ -9,29 +9,50 @@ use crate::{
     description::ModelFormat,
 };
 
-/// A glb with everything that is read: hierarchy, two materials, texture, normals, sparse and normalised accessors.
+/// A glb with everything that is read: hierarchy, lights, materials with all extensions, texture, normals, sparse and normalised accessors.
 fn rich_glb() -> Vec<u8> {
     let mut file = Gltf::cube(json!({
-        "nodes": [{ "children": [1, 2], "rotation": [0, 0.6, 0, 0.8] }, { "mesh": 0 }, { "mesh": 0, "scale": [1, -2, 3] }],
+        "nodes": [{ "children": [1, 2], "rotation": [0, 0.6, 0, 0.8] }, { "mesh": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } },
+            { "mesh": 0, "scale": [1, -2, 3], "extensions": { "KHR_lights_punctual": { "light": 1 } } },
+        ],
         "scenes": [{ "nodes": [0] }], "scene": 0,
-        "materials": [{ "alphaMode": "MASK", "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }],
+        "materials": [{
+            "alphaMode": "MASK", "alphaCutoff": 0.5, "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicRoughnessTexture": { "index": 0 } },
+            "normalTexture": { "index": 0, "texCoord": 1, "scale": 0.5, "extensions": { "KHR_texture_transform": { "rotation": 0.5, "scale": [2, 2] } } },
+            "emissiveFactor": [0.5, 0, 0.5], "emissiveTexture": { "index": 0, "extensions": { "KHR_texture_transform": { "offset": [0.5, 2] } } },
+            "extensions": {
+                "KHR_materials_ior": { "ior": 1.3 }, "KHR_materials_emissive_strength": { "emissiveStrength": 8 },
+                "KHR_materials_specular": { "specularFactor": 0.5, "specularColorFactor": [1, 2, 0.5] },
+                "KHR_materials_transmission": { "transmissionFactor": 0.8 },
+                "KHR_materials_volume": { "thicknessFactor": 2, "attenuationDistance": 3, "attenuationColor": [0.5, 0.6, 0.7] },
+                "KHR_materials_clearcoat": { "clearcoatFactor": 0.9, "clearcoatRoughnessFactor": 0.3, "clearcoatNormalTexture": { "index": 0 } },
+                "KHR_materials_sheen": { "sheenColorFactor": [0.1, 0.2, 0.3], "sheenRoughnessFactor": 0.6 },
+                "KHR_materials_anisotropy": { "anisotropyStrength": 0.7, "anisotropyRotation": -1 },
+            },
+        }],
+        "extensions": { "KHR_lights_punctual": { "lights": [
+            { "type": "point", "color": [1, 0.5, 0], "intensity": 10, "range": 3 },
+            { "type": "spot", "spot": { "innerConeAngle": 0.25, "outerConeAngle": 0.5 } },
+        ] } },
         "textures": [{ "source": 0, "sampler": 0 }], "samplers": [{ "wrapS": 33071 }],
     }));
     let png = file.view(&small_png());
     file.json["images"] = json!([{ "bufferView": png, "mimeType": "image/png" }]);
     let normals = file.floats(&[[0.0, 1.0, 0.0]; 8], "VEC3");
     let uvs = file.floats(&[[0.5, 0.5]; 8], "VEC2");
+    let tangents = file.floats(&[[1.0, 0.0, 0.0, 1.0]; 8], "VEC4");
     let colors = file.accessor(&[200; 32], 5121, "VEC4", 8);
     let (indices, values) = (file.view(&[3]), file.view(&[0; 12]));
     file.json["accessors"][0]["sparse"] = json!({
         "count": 1, "indices": { "bufferView": indices, "componentType": 5121 }, "values": { "bufferView": values },
     });
-    *file.attributes() = json!({ "POSITION": 0, "NORMAL": normals, "TEXCOORD_0": uvs, "COLOR_0": colors });
+    *file.attributes() =
+        json!({ "POSITION": 0, "NORMAL": normals, "TEXCOORD_0": uvs, "COLOR_0": colors, "TEXCOORD_1": uvs, "TANGENT": tangents });
     file.json["meshes"][0]["primitives"][0]["material"] = json!(0);
     file.glb()
 }
 
-const MTL: &[u8] = b"newmtl a\nKd 1 0.5 0\nmap_Kd -o 1 2 3 -clamp on a.png\nd 0.5\nKe 1 1 1\nnewmtl b\nTr 0.25\n";
+const MTL: &[u8] = b"newmtl a\nKd 1 0.5 0\nmap_Kd -o 1 2 3 -clamp on a.png\nd 0.5\nKe 1 1 1\nmap_Ke a.png\nnorm a.png\nKs 0.5 1 1\nNs 30\nNi 1.5\nillum 2\nPr 0.5\nPm 1\nPc 0.5\nPcr 0.2\nnewmtl b\nTr 0.25\n";
 
 /// Every kind of file that is read.
 fn files() -> Vec<(ModelFormat, Vec<u8>)> {

@@ -3,7 +3,7 @@ use serde_json::json;
 
 use super::{check_promises, cube_triangles, failure, glb::Gltf, load_with, small_png, triangles};
 use crate::{
-    assets::{LoadedModel, model_references},
+    assets::{AlphaMode, LoadedModel, ModelMaterial, model_references},
     description::{ModelFormat, Wrap},
     texture::Texture,
 };
@@ -168,8 +168,8 @@ fn materials_carry_colour_texture_mask_and_sides() {
     let model = load(textured(material, json!({ "wrapS": 33071, "wrapT": 33648 })));
     let leaf = &model.materials[model.meshes[0].material];
     assert_eq!((leaf.name.as_str(), leaf.base_color), ("leaf", [0.5, 0.25, 1.0, 0.75]));
-    assert_eq!((leaf.alpha_cutoff, leaf.double_sided), (Some(0.3), true));
-    let Texture::Image { wrap, .. } = &model.textures[leaf.texture.unwrap()] else { panic!("an image is expected") };
+    assert_eq!((leaf.alpha, leaf.double_sided), (AlphaMode::Mask(0.3), true));
+    let Texture::Image { wrap, .. } = &model.textures[leaf.base_color_texture.unwrap()] else { panic!("an image is expected") };
     assert_eq!(*wrap, [Wrap::Clamp, Wrap::Mirror]);
     let texture = &model.textures[0];
     assert_eq!(texture.rgba(DVec2::new(0.25, 0.25)), [1.0, 0.0, 0.0, 1.0]);
@@ -178,14 +178,17 @@ fn materials_carry_colour_texture_mask_and_sides() {
     assert_eq!(model.warnings, [] as [&str; 0]);
     let plain = load(cube(|_| {}));
     let default = &plain.materials[plain.meshes[0].material];
-    assert_eq!((default.base_color, default.texture, default.alpha_cutoff, default.double_sided), ([1.0; 4], None, None, false));
+    assert_eq!(*default, ModelMaterial::new("default"));
 }
 
 #[test]
 fn texture_coordinates_are_those_that_the_texture_asks_for() {
     let uv = |info: serde_json::Value| {
         let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": info, "metallicFactor": 0 } });
-        load(textured(material, json!({}))).meshes[0].uvs[0]
+        let model = load(textured(material, json!({})));
+        let [u, v] = model.meshes[0].uvs[0].map(f64::from);
+        let DVec2 { x, y } = model.textures[0].coordinates().of([DVec2::new(u, v), DVec2::NAN]);
+        [x, y]
     };
     assert_eq!(uv(json!({ "index": 0 })), [0.25, 0.75]);
     assert_eq!(uv(json!({ "index": 0, "texCoord": 1 })), [0.5, 1.0]);
@@ -211,8 +214,8 @@ fn buffers_come_from_data_uris_and_from_files() {
 #[test]
 fn only_needed_images_are_referred_to() {
     let mut file =
-        textured(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } }, "normalTexture": { "index": 1 } }), json!({}));
-    file.json["images"] = json!([{ "uri": "color.png" }, { "uri": "normal.png" }]);
+        textured(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } }, "occlusionTexture": { "index": 1 } }), json!({}));
+    file.json["images"] = json!([{ "uri": "color.png" }, { "uri": "occlusion.png" }]);
     file.json["textures"] = json!([{ "source": 0 }, { "source": 1 }]);
     let (bytes, bin) = file.gltf(Some("b.bin"));
     assert_eq!(model_references(ModelFormat::Gltf, &bytes).unwrap(), ["b.bin", "color.png"]);
@@ -233,7 +236,7 @@ fn names_outside_of_the_folder_are_refused() {
 #[test]
 fn what_is_not_modelled_is_named() {
     let mut file = textured(
-        json!({ "name": "glass", "alphaMode": "BLEND", "emissiveFactor": [0, 1, 0], "normalTexture": { "index": 0 }, "occlusionTexture": { "index": 0 } }),
+        json!({ "name": "glass", "alphaMode": "BLEND", "emissiveFactor": [0, 1, 0], "normalTexture": { "index": 0 }, "extensions": { "KHR_materials_unlit": {} } }),
         json!({ "magFilter": 9728 }),
     );
     let metal = |name: usize| json!({ "name": format!("metal {name}") });
@@ -242,7 +245,7 @@ fn what_is_not_modelled_is_named() {
     }
     file.json["materials"][0]["pbrMetallicRoughness"] =
         json!({ "metallicFactor": 0, "roughnessFactor": 0.5, "baseColorTexture": { "index": 0, "texCoord": 3 } });
-    file.json["extensionsUsed"] = json!(["KHR_texture_transform", "KHR_materials_unlit", "KHR_lights_punctual"]);
+    file.json["extensionsUsed"] = json!(["KHR_texture_transform", "KHR_materials_iridescence", "KHR_lights_punctual"]);
     file.json["animations"] = json!([{ "channels": [], "samplers": [] }]);
     file.json["cameras"] = json!([{ "type": "perspective", "perspective": { "yfov": 1, "znear": 1 } }]);
     file.json["skins"] = json!([{ "joints": [0] }]);

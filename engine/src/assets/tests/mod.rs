@@ -1,8 +1,9 @@
 //! Files made by hand, in code: what they say is known exactly.
 
 mod damage;
-mod glb;
+pub(crate) mod glb;
 mod gltf;
+mod materials;
 mod obj;
 mod ply;
 mod polygon;

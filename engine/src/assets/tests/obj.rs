@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::{CUBE_CORNERS, CUBE_FACES, check_promises, failure, glb::Gltf, load_with, small_png, triangles};
 use crate::{
-    assets::{LoadedModel, model_references, part_references},
+    assets::{AlphaMode, LoadedModel, model_references, part_references},
     description::{ModelFormat, Wrap},
     texture::{Texture, srgb_to_linear},
 };
@@ -128,8 +128,8 @@ fn materials_come_from_libraries() {
     let model = load(&obj, &parts);
     assert_eq!(model.meshes.iter().map(|mesh| mesh.triangles.len()).collect::<Vec<_>>(), [2, 10]);
     let [wood, leaf] = &model.materials[..] else { panic!("two materials are expected") };
-    assert_eq!((wood.name.as_str(), wood.base_color, wood.alpha_cutoff), ("wood", [0.5, 0.25, 1.0, 1.0], None));
-    assert_eq!((leaf.name.as_str(), leaf.base_color, leaf.alpha_cutoff), ("leaf", [1.0; 4], Some(0.5)));
+    assert_eq!((wood.name.as_str(), wood.base_color, wood.alpha), ("wood", [0.5, 0.25, 1.0, 1.0], AlphaMode::Opaque));
+    assert_eq!((leaf.name.as_str(), leaf.base_color, leaf.alpha), ("leaf", [1.0; 4], AlphaMode::Blend));
     let wraps = model.textures.iter().map(|texture| match texture {
         Texture::Image { wrap, .. } => *wrap,
         Texture::Checker { .. } => panic!("an image is expected"),

@@ -5,6 +5,7 @@ mod builds;
 mod cones;
 mod errors;
 mod meshes;
+mod models;
 mod pencils;
 mod rectangles;
 mod spawn;
