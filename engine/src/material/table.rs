@@ -8,22 +8,30 @@ use super::microfacet::{Ggx, SMOOTH_ALPHA};
 use crate::math::atan2;
 
 /// Directions of a row.
-const NODES: usize = 64;
+const NODES: usize = 24 * STRIDE + 1;
+/// Every so many of them are computed in any case; a power of two.
+const STRIDE: usize = 8;
+/// Between two nodes, others are computed unless the one in the middle lies as near as this to the straight line, and at the last grazing angles.
+const STRAIGHT: f64 = 1e-3;
 /// Rows over roughness.
-const ROUGHNESSES: usize = 48;
+const ROUGHNESSES: usize = 21 * EVERY + 1;
 /// Rows over azimuth.
-const AZIMUTHS: usize = 20;
-/// Roughnesses for which means are kept: they change faster than the rows.
-const MEANS: usize = 256;
-/// Steps of a mean's quadrature between two nodes.
-const STEPS: usize = 4;
+const AZIMUTHS: usize = 12 * EVERY + 1;
+/// Every so many rows are computed; those between follow from them.
+const EVERY: usize = 3;
+/// Roughnesses for which means are kept, even in the fourth root: they change faster than the rows.
+const MEANS: usize = 768;
+/// Steps of a mean's quadrature between two rows.
+const STEPS: usize = 2;
+/// Gauss and Legendre's quadrature over [0, 1]: places and weights.
+const GAUSS: [(f64, f64); 3] = [(0.112_701_665_379_258_31, 5.0 / 18.0), (0.5, 4.0 / 9.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
 /// What the rows stand for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Rows {
     /// One isotropic alpha: one row.
     Fixed,
-    /// One anisotropic alpha: rows over the first quarter of the azimuth, by the share of x in the tilt that the surface sees.
+    /// One anisotropic alpha: rows over the first quarter of the azimuth, even in [`turn`].
     Azimuth(DVec2),
     /// Alpha from [`SMOOTH_ALPHA`] to 1, even in its square root.
     Roughness,
@@ -31,8 +39,9 @@ enum Rows {
 
 /// Functions of a direction and, maybe, of roughness, interpolated linearly.
 ///
-/// Along a row, nodes are even in the square root of `cos / (cos + tilt)`, where `tilt = alpha sin` as the surface sees it: masking depends on little
-/// else, so that the spacing resolves the last grazing angles of the smoothest surface, at which albedos are steepest.
+/// Along a row, nodes are even in the mean of the cosine and of the fourth root of `cos / (cos + tilt)`, where `tilt = alpha sin` as the surface
+/// sees it. Masking depends on little but the latter, which resolves the last grazing angles of the smoothest surface, at which albedos are steepest;
+/// the cosine resolves where total reflection begins. Of the nodes, those are computed between which functions bend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table<const K: usize> {
     rows: Rows,
@@ -60,21 +69,27 @@ impl<const K: usize> Table<K> {
             table.means = vec![table.mean_of(fill, alpha.x, 0.0)];
             return table;
         }
-        let rows = |at: usize| row(ggx, azimuth(alpha, grid(at, AZIMUTHS)), fill);
-        let mut table = Self { rows: Rows::Azimuth(alpha), nodes: (0..AZIMUTHS).map(rows).collect(), means: Vec::new() };
+        let rows = (0..AZIMUTHS).step_by(EVERY).map(|at| row(ggx, azimuth(alpha, grid(at, AZIMUTHS)), fill)).collect();
+        let mut table = Self { rows: Rows::Azimuth(alpha), nodes: denser(rows), means: Vec::new() };
         table.means = vec![table.mean_of_azimuths(fill, alpha)];
         table
     }
 
     /// A table for all isotropic roughnesses.
     pub fn over_roughness<F: Fill<K>>(fill: &F) -> Self {
-        let rows = |at: usize| {
+        let exact = |at: usize| {
             let alpha = squared(grid(at, ROUGHNESSES));
-            Ggx::new(alpha, alpha).map_or([[0.0; K]; NODES], |ggx| row(&ggx, DVec2::X, fill))
+            row(&Ggx::clamped([alpha; 2]), DVec2::X, fill)
         };
-        let mut table = Self { rows: Rows::Roughness, nodes: (0..ROUGHNESSES).map(rows).collect(), means: Vec::new() };
+        let mut nodes = denser((0..ROUGHNESSES).step_by(EVERY).map(exact).collect());
+        // The first rows differ most in proportion.
+        for (at, row) in nodes.iter_mut().enumerate().take(EVERY).skip(1) {
+            *row = exact(at);
+        }
+        let mut table = Self { rows: Rows::Roughness, nodes, means: Vec::new() };
         let means = |at: usize| {
-            let alpha = squared(at as f64 / MEANS as f64);
+            let root = at as f64 / MEANS as f64;
+            let alpha = squared(root * root);
             let mean = table.mean_of(fill, alpha, roughness_row(alpha));
             std::array::from_fn(|k| if F::FALLING[k] { mean[k] / alpha } else { mean[k] })
         };
@@ -82,29 +97,35 @@ impl<const K: usize> Table<K> {
         table
     }
 
-    /// The values for facets and a direction, on either side.
+    /// Whether the table tells more than an estimate of these facets.
+    #[inline(always)]
+    pub fn knows(&self, ggx: &Ggx) -> bool {
+        self.rows != Rows::Roughness || ggx.alpha().x == ggx.alpha().y
+    }
+
+    /// The values for facets and a direction, on either side. A table for all roughnesses takes anisotropic facets for isotropic ones.
     #[inline]
     pub fn at(&self, ggx: &Ggx, w: DVec3) -> [f64; K] {
         let alpha = ggx.alpha();
-        let (x, y, cos) = (w.x.abs() * alpha.x, w.y.abs() * alpha.y, w.z.abs());
+        let (x, y, cos) = (w.x * alpha.x, w.y * alpha.y, w.z.abs());
         let tilt = (x * x + y * y).sqrt();
         let row = match self.rows {
             Rows::Fixed => 0.0,
-            Rows::Azimuth(_) => share(x, y) * (AZIMUTHS - 1) as f64,
+            Rows::Azimuth(_) => turn(alpha, DVec2::new(w.x, w.y)) * (AZIMUTHS - 1) as f64,
             Rows::Roughness if alpha.x == alpha.y => roughness_row(alpha.x),
             Rows::Roughness => roughness_row((0.5 * alpha.length_squared()).sqrt()),
         };
-        self.interpolate(row, share(cos, tilt).sqrt())
+        self.interpolate(row, place(cos, tilt))
     }
 
-    /// Means over the cosine-weighted hemisphere; `F` filled the table.
+    /// Means over the cosine-weighted hemisphere of what [`Self::at`] tells; `F` filled the table.
     #[inline]
     pub fn mean<F: Fill<K>>(&self, ggx: &Ggx) -> [f64; K] {
         if self.rows != Rows::Roughness {
             return self.means.first().copied().unwrap_or([0.0; K]);
         }
         let alpha = (0.5 * ggx.alpha().length_squared()).sqrt();
-        let (low, t) = cell(alpha.sqrt() * MEANS as f64, self.means.len());
+        let (low, t) = cell(alpha.sqrt().sqrt() * MEANS as f64, self.means.len());
         let (a, b) = (self.means[low], self.means[low + 1]);
         std::array::from_fn(|k| (a[k] + (b[k] - a[k]) * t) * if F::FALLING[k] { alpha } else { 1.0 })
     }
@@ -124,20 +145,21 @@ impl<const K: usize> Table<K> {
         std::array::from_fn(|k| a[k] + (b[k] - a[k]) * t)
     }
 
-    /// `2 int f cos dcos` by midpoints, exact in the weights: `2 cos dcos` is the difference of the squared cosine.
-    ///
-    /// Steps are even in the cosine: for smooth surfaces the last cell holds nearly all of the hemisphere.
+    /// `2 int f cos dcos`, node by node, as closely as what is missing must be scattered again.
     fn mean_of<F: Fill<K>>(&self, fill: &F, alpha: f64, row: f64) -> [f64; K] {
         let mut sum = [0.0; K];
-        for node in 0..NODES - 1 {
-            let (low, high) = (cosine(alpha, grid(node, NODES)), cosine(alpha, grid(node + 1, NODES)));
-            let width = (high - low) / STEPS as f64;
-            for step in 0..STEPS {
-                let cos = low + (step as f64 + 0.5) * width;
+        let mut low = 0.0;
+        for node in 1..NODES {
+            let high = cosine_at(alpha, grid(node, NODES));
+            for (at, weight) in GAUSS {
+                // Dense at the lower end: where a smooth surface begins to be seen as one, one cell holds many cosines.
+                let cos = low + (high - low) * (at * at);
                 let tilt = alpha * (1.0 - cos * cos).max(0.0).sqrt();
-                let value = fill.meaning(self.interpolate(row, share(cos, tilt).sqrt()), cos);
-                sum = std::array::from_fn(|k| sum[k] + value[k] * (2.0 * cos * width));
+                let value = fill.meaning(self.interpolate(row, place(cos, tilt)), cos);
+                let weight = weight * 4.0 * at * (high - low) * cos;
+                sum = std::array::from_fn(|k| sum[k] + value[k] * weight);
             }
+            low = high;
         }
         sum
     }
@@ -189,22 +211,119 @@ fn squared(root: f64) -> f64 {
     (root * root).max(SMOOTH_ALPHA)
 }
 
-/// The cosine whose share in `cos + alpha sin` is `x^2`.
-fn cosine(alpha: f64, x: f64) -> f64 {
-    let (cos, sin) = (x * x * alpha, 1.0 - x * x);
+/// Where in a row a direction lies, from 0 along the surface to 1 straight on.
+#[inline(always)]
+fn place(cos: f64, tilt: f64) -> f64 {
+    0.5 * (cos + share(cos, tilt).sqrt().sqrt())
+}
+
+/// The cosine whose share in `cos + alpha sin` is `root^4`.
+fn cosine(alpha: f64, root: f64) -> f64 {
+    let share = (root * root) * (root * root);
+    let (cos, sin) = (share * alpha, 1.0 - share);
     cos / (cos * cos + sin * sin).sqrt()
 }
 
-/// The azimuth, as a unit vector, in which x has the share `x` in the tilt that the surface sees.
-fn azimuth(alpha: DVec2, x: f64) -> DVec2 {
-    DVec2::new(x * alpha.y, (1.0 - x) * alpha.x).normalize_or(DVec2::X)
+/// The cosine at a [`place`].
+fn cosine_at(alpha: f64, place: f64) -> f64 {
+    cosine(alpha, solve(|root| 0.5 * (cosine(alpha, root) + root) - place))
+}
+
+/// Where in the first quarter an azimuth lies, from 0 along y to 1 along x: the mean of the shares of x in the direction and in the tilt that the
+/// surface sees.
+#[inline(always)]
+fn turn(alpha: DVec2, w: DVec2) -> f64 {
+    let (x, y) = (w.x.abs(), w.y.abs());
+    0.5 * (share(x, y) + share(x * alpha.x, y * alpha.y))
+}
+
+/// The azimuth, as a unit vector, at a [`turn`].
+fn azimuth(alpha: DVec2, at: f64) -> DVec2 {
+    let of = |share: f64| DVec2::new(share * alpha.y, (1.0 - share) * alpha.x).normalize_or(DVec2::X);
+    of(solve(|share| turn(alpha, of(share)) - at))
+}
+
+/// Where in [0, 1] a rising function from at most 0 to at least 0 vanishes: by the regula falsi, as in Illinois.
+fn solve(f: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high, mut below, mut above) = (0.0, 1.0, f(0.0), f(1.0));
+    let mut last = 0.0;
+    for _ in 0..60 {
+        if below >= 0.0 {
+            return low;
+        }
+        if above <= 0.0 || high - low < 1e-15 {
+            return high;
+        }
+        let x = (low * above - high * below) / (above - below);
+        let value = f(x);
+        // The end that stays twice counts half.
+        if value < 0.0 {
+            (low, below, above) = (x, value, if last < 0.0 { 0.5 * above } else { above });
+        } else {
+            (high, above, below) = (x, value, if last > 0.0 { 0.5 * below } else { below });
+        }
+        last = value;
+    }
+    high
+}
+
+/// Rows between the given ones by cubic interpolation (Lagrange's) from the four nearest, within their range.
+fn denser<const K: usize>(rows: Vec<[[f64; K]; NODES]>) -> Vec<[[f64; K]; NODES]> {
+    let between = |at: usize| {
+        let first = (at / EVERY).saturating_sub(1).min(rows.len() - 4);
+        let x = at as f64 / EVERY as f64 - first as f64;
+        let weights = [
+            (x - 1.0) * (x - 2.0) * (x - 3.0) / -6.0,
+            x * (x - 2.0) * (x - 3.0) / 2.0,
+            x * (x - 1.0) * (x - 3.0) / -2.0,
+            x * (x - 1.0) * (x - 2.0) / 6.0,
+        ];
+        let value = |node: usize, k: usize| {
+            let of: [f64; 4] = std::array::from_fn(|row| rows[first + row][node][k]);
+            let sum: f64 = of.iter().zip(weights).map(|(value, weight)| value * weight).sum();
+            sum.clamp(of.iter().copied().fold(f64::MAX, f64::min), of.iter().copied().fold(f64::MIN, f64::max))
+        };
+        std::array::from_fn(|node| std::array::from_fn(|k| value(node, k)))
+    };
+    (0..(rows.len() - 1) * EVERY + 1).map(between).collect()
 }
 
 fn row<const K: usize, F: Fill<K>>(ggx: &Ggx, azimuth: DVec2, fill: &F) -> [[f64; K]; NODES] {
     let alpha = (ggx.alpha() * azimuth).length();
-    std::array::from_fn(|node| {
-        let cos = cosine(alpha, grid(node, NODES));
+    let value = |node: usize| {
+        let cos = cosine_at(alpha, grid(node, NODES));
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         fill.value(ggx, DVec3::new(azimuth.x * sin, azimuth.y * sin, cos))
-    })
+    };
+    let mut row = [[0.0; K]; NODES];
+    row[0] = value(0);
+    for high in (STRIDE..NODES).step_by(STRIDE) {
+        row[high] = value(high);
+        refine(&mut row, high - STRIDE, high, &value);
+    }
+    row
+}
+
+/// Fills a row between two nodes, of which there is a power of two.
+fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, value: &impl Fn(usize) -> [f64; K]) {
+    let half = (high - low) / 2;
+    if half == 0 {
+        return;
+    }
+    let (a, middle, b) = (row[low], value(low + half), row[high]);
+    row[low + half] = middle;
+    let bend: [f64; K] = std::array::from_fn(|k| 0.5 * (a[k] + b[k]) - middle[k]);
+    if low < STRIDE || bend.iter().any(|bend| bend.abs() > STRAIGHT) {
+        refine(row, low, low + half, value);
+        refine(row, low + half, high, value);
+        return;
+    }
+    // The parabola through the three, within their range.
+    for (node, row) in row.iter_mut().enumerate().take(high).skip(low + 1) {
+        let t = (node - low) as f64 / half as f64 - 1.0;
+        *row = std::array::from_fn(|k| {
+            let value = middle[k] + t * (0.5 * (b[k] - a[k]) + t * bend[k]);
+            value.clamp(a[k].min(b[k]).min(middle[k]), a[k].max(b[k]).max(middle[k]))
+        });
+    }
 }

@@ -9,8 +9,8 @@ use super::{Rect, RenderedPart, SampleRange, render};
 use crate::{
     accel::{Content, Identity, LeafRule, Tree, Triangles},
     description::{
-        Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, Matrix, MemoryAssets, MeshData, Object,
-        ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+        AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, Fresnel, Group, Light, Material, Matrix, Medium,
+        MemoryAssets, MeshData, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     scene,
 };
@@ -26,14 +26,14 @@ pub struct CanaryError(String);
 /// Only if the engine is at fault.
 pub fn canary_hash(seed: u64) -> Result<[u8; 32], CanaryError> {
     let (frame, assets) = canary(seed)?;
-    let scene = scene::Scene::compile(&frame, &assets).map_err(fault)?;
-    proof(&scene)
+    let compile = |frame: &Frame| scene::Scene::compile(frame, &assets).map_err(fault);
+    proof(&compile(&frame)?, &compile(&in_all_light(frame))?)
 }
 
-/// What a node with this canary answers.
-fn proof(scene: &scene::Scene) -> Result<[u8; 32], CanaryError> {
+/// What a node answers that has this canary, and this one of paths.
+fn proof(scene: &scene::Scene, lit: &scene::Scene) -> Result<[u8; 32], CanaryError> {
     let mut hasher = blake3::Hasher::new();
-    [pixels(scene)?, scene.tree_hash(), hash(&thicket())].iter().for_each(|hash| _ = hasher.update(hash));
+    [pixels(scene)?, scene.tree_hash(), hash(&thicket()), pixels(lit)?].iter().for_each(|hash| _ = hasher.update(hash));
     Ok(*hasher.finalize().as_bytes())
 }
 
@@ -106,6 +106,58 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
         seed,
     };
     Ok((frame, assets))
+}
+
+/// The canary's frame by path tracing: the same things of other materials, in fog, among surfaces and surroundings that shine, seen through a lens.
+pub(super) fn in_all_light(mut frame: Frame) -> Frame {
+    let fog = |density: f32| Medium { absorption: [density, 0.0, 0.5 * density], scattering: [0.5 * density; 3], anisotropy: 0.4 };
+    let scene = &mut frame.scene;
+    let image = match &scene.textures[1] {
+        Texture::Image { file, .. } => *file,
+        Texture::Checker { .. } => AssetId([0; 32]),
+    };
+    scene.materials = vec![
+        Material::RoughDiffuse { reflectance: [0.9; 3], texture: Some(0), roughness: 0.5 },
+        Material::Plastic { reflectance: [0.8, 0.9, 1.0], texture: Some(1), ior: 1.5, roughness: 0.3 },
+        Material::Metal {
+            fresnel: Fresnel::Index { eta: [0.18, 0.42, 1.37], k: [3.42, 2.35, 1.77] },
+            roughness: [0.5, 0.3],
+            multiple_scattering: true,
+        },
+        Material::Glass {
+            ior: 1.45,
+            reflectance: [1.0; 3],
+            transmittance: [0.95, 1.0, 0.95],
+            roughness: 0.3,
+            multiple_scattering: true,
+            interior: Some(fog(0.5)),
+            priority: 1,
+        },
+        Material::Emitter { radiance: [9.0, 8.0, 5.0], texture: None, two_sided: false },
+        Material::Emitter { radiance: [2.0; 3], texture: Some(1), two_sided: true },
+        Material::Boundary { interior: fog(0.8) },
+        Material::smooth_glass(1.33, [1.0; 3]),
+    ];
+    scene.groups[1].objects.extend([
+        shape(Shape::Sphere { center: [-1.2, 2.2, 1.0], radius: 0.3 }, 4, None),
+        shape(Shape::Disc { center: [1.9, 2.1, 0.2], normal: [-1.0, -1.0, 0.2], radius: 0.4 }, 5, None),
+        shape(Shape::Box { min: [0.9, 0.0, 1.3], max: [1.5, 0.7, 1.9] }, 6, None),
+        shape(Shape::Sphere { center: [0.2, 0.4, 2.0], radius: 0.35 }, 7, None),
+    ]);
+    scene.background = Environment::Image { file: image, scale: [0.4; 3], rotation: 30.0, source: SourceId::default() };
+    scene.medium = Some(fog(0.01));
+    frame.camera = Camera::Perspective {
+        eye: [0.4, 1.9, 5.2],
+        look_at: [-0.2, 0.6, 0.0],
+        up: [0.0, 1.0, 0.0],
+        horizontal_fov: 48.0,
+        lens_radius: 0.05,
+        focus_distance: 5.0,
+    };
+    frame.film = Film { width: 48, height: 36, filter: Filter::Mitchell };
+    frame.render = Render::Path { max_depth: 8, roulette_depth: 3 };
+    frame.quality = Quality { samples: 4 };
+    frame
 }
 
 fn shape(shape: Shape, material: u32, transform: Option<Matrix>) -> Object {
@@ -195,11 +247,33 @@ mod tests {
         scene::Scene::compile(&frame, &assets).unwrap()
     }
 
+    fn lit(seed: u64) -> scene::Scene {
+        let (frame, assets) = canary(seed).unwrap();
+        scene::Scene::compile(&in_all_light(frame), &assets).unwrap()
+    }
+
     /// The first node of a farm sets what the others must agree with, so this hash may change, but only together with [`crate::REVISION`] or with what the frame shows.
     #[test]
     fn the_hash_is_that_of_this_revision() {
         let pixels = hex(pixels(&compiled(1)).unwrap());
         assert_eq!((crate::REVISION, pixels.as_str()), (3, "bb53a9fc2c50cb86b0ffece72f6a8519d49e916ded3b5fbff15b7cb2044dc7ad"));
+    }
+
+    /// The same of paths.
+    #[test]
+    fn the_hash_of_paths_is_that_of_this_revision() {
+        let pixels = hex(pixels(&lit(1)).unwrap());
+        assert_eq!((crate::REVISION, pixels.as_str()), (3, "c2f533925f771546ff4b97966843b3f81263ecdcd8a84081c5f5083587117d9b"));
+    }
+
+    /// Every kind of surface, light and medium is met, and nothing in it is no number.
+    #[test]
+    fn paths_of_the_canary_are_sound() {
+        let scene = lit(1);
+        let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
+        let part = render(&scene, rect, SampleRange { first: 0, count: 64 }, &AtomicBool::new(false)).unwrap();
+        assert_eq!(part.counters.invalid_samples, 0);
+        assert!(scene.has_media() && scene.light_sampler.has_local() && scene.light_sampler.has_distant());
     }
 
     /// Other trees are another build to a farm, though no picture tells: these hashes may change at any time, but not unnoticed, and not by machine.
@@ -217,7 +291,8 @@ mod tests {
         assert_eq!(pixels(&usual).unwrap(), pixels(&other).unwrap());
         assert_ne!(usual.tree_hash(), other.tree_hash());
         assert_eq!(usual.tree_hash(), compiled(2).tree_hash());
-        assert_ne!(proof(&usual).unwrap(), proof(&other).unwrap());
+        let lit = lit(1);
+        assert_ne!(proof(&usual, &lit).unwrap(), proof(&other, &lit).unwrap());
     }
 
     #[test]

@@ -188,19 +188,26 @@ fn an_invalid_sample_is_black_and_counted() {
 /// Every kind of work, with the instructions that every machine has and with the best of this one.
 #[test]
 fn pixels_are_the_same_with_all_instructions() {
-    let pixels = |simd| {
-        let scene = busy().with_simd(simd);
+    let pixels = |scene: &dyn Fn() -> Scene, simd| {
+        let scene = scene().with_simd(simd);
         let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
         let part = render(&scene, rect, SampleRange { first: 0, count: scene.quality.samples.into() }, &AtomicBool::new(false)).unwrap();
         part.pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
     };
-    assert_eq!(pixels(Simd::Baseline), pixels(Simd::detect()));
+    assert_eq!(pixels(&busy, Simd::Baseline), pixels(&busy, Simd::detect()));
+    assert_eq!(pixels(&busy_paths, Simd::Baseline), pixels(&busy_paths, Simd::detect()));
 }
 
 /// A frame of every kind of work.
 fn busy() -> Scene {
     let (frame, assets) = canary(3).unwrap();
     Scene::compile(&frame, &assets).unwrap()
+}
+
+/// The same by path tracing, with all that this needs more.
+fn busy_paths() -> Scene {
+    let (frame, assets) = canary(3).unwrap();
+    Scene::compile(&canary::in_all_light(frame), &assets).unwrap()
 }
 
 const WHOLE: SampleRange = SampleRange { first: 0, count: 5 };
@@ -222,18 +229,22 @@ fn cut(rect: Rect, parts: &mut Vec<Rect>) {
 
 #[test]
 fn parts_of_any_size_in_any_order_give_the_same_bytes() {
-    let scene = busy();
+    [busy(), busy_paths()].iter().for_each(any_parts_give_the_same_bytes);
+}
+
+fn any_parts_give_the_same_bytes(scene: &Scene) {
     let go = AtomicBool::new(false);
-    let all = Rect { x: 0, y: 0, width: 64, height: 48 };
-    let mut whole = Film::new(64, 48);
-    whole.place(&render(&scene, all, WHOLE, &go).unwrap()).unwrap();
+    let (width, height) = (scene.film.width, scene.film.height);
+    let all = Rect { x: 0, y: 0, width, height };
+    let mut whole = Film::new(width, height);
+    whole.place(&render(scene, all, WHOLE, &go).unwrap()).unwrap();
 
     let mut parts = Vec::new();
     cut(all, &mut parts);
     assert!(parts.len() > 20 && parts.iter().map(Rect::area).sum::<u64>() == all.area());
     parts.sort_by_key(|rect| (rect.x * 31 + rect.y * 17) % 13);
-    let mut film = Film::new(64, 48);
-    parts.iter().for_each(|&rect| film.place(&render(&scene, rect, WHOLE, &go).unwrap()).unwrap());
+    let mut film = Film::new(width, height);
+    parts.iter().for_each(|&rect| film.place(&render(scene, rect, WHOLE, &go).unwrap()).unwrap());
     assert_eq!(film.hash(), whole.hash());
 }
 

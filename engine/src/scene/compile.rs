@@ -21,7 +21,7 @@ use crate::{
 type Result<T> = std::result::Result<T, CompileError>;
 
 /// Rows of the picture of a clear sky.
-const SKY_ROWS: u32 = 512;
+const SKY_ROWS: u32 = 256;
 
 /// Most rows and columns of a film.
 const LARGEST_FILM: u32 = 65_536;

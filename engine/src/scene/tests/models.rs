@@ -170,8 +170,8 @@ fn dark_triangles_of_a_shining_texture_are_no_lights() {
 #[test]
 fn shining_models_light_the_scene() {
     let material = json!({
-        "doubleSided": true, "emissiveFactor": [0.25, 0.25, 0.25], "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1] },
-        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 } },
+        "doubleSided": true, "emissiveFactor": [0.25, 0.25, 0.25], "pbrMetallicRoughness": { "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0 },
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 4 }, "KHR_materials_specular": { "specularFactor": 0 } },
     });
     let mut cube = Gltf::cube(json!({ "nodes": [{ "mesh": 0 }], "materials": [material] }));
     cube.json["meshes"][0]["primitives"][0]["material"] = json!(0);
