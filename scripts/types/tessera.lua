@@ -13,6 +13,8 @@
 ---@class tessera.Texture
 ---@class tessera.Medium
 ---@class tessera.Environment
+---@class tessera.Medium
+---@class tessera.Environment
 ---@class tessera.Light
 ---@class tessera.Camera
 ---@class tessera.Integrator
@@ -408,6 +410,33 @@ function tessera.medium(keys) end
 ---@param keys? tessera.CheckerKeys
 ---@return tessera.Texture
 function tessera.checker(keys) end
+
+-- @api gradient
+---@class tessera.GradientKeys
+---@field from? tessera.Color colour at start
+---@field to? tessera.Color colour at end
+---@field start? number[] where it begins
+---@field end? number[] where it ends, elsewhere; the defaults go up where v = 0 lies at the top
+---@field name? string for messages
+
+---A colour that changes evenly along a line in uv, and stays the same across it and beyond its ends.
+---@param keys? tessera.GradientKeys
+---@return tessera.Texture
+function tessera.gradient(keys) end
+
+-- @api noise
+---@class tessera.NoiseKeys
+---@field low? tessera.Color colour where it is lowest
+---@field high? tessera.Color colour where it is highest
+---@field size? number distance of the largest clouds in units of uv
+---@field octaves? number how fine it gets
+---@field seed? number chooses the pattern
+---@field name? string for messages
+
+---Clouds of two colours: Perlin's gradient noise, several octaves of it, each of half the size and half the strength of the one before.
+---@param keys? tessera.NoiseKeys
+---@return tessera.Texture
+function tessera.noise(keys) end
 
 -- @api image
 ---@class tessera.ImageKeys

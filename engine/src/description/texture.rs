@@ -19,6 +19,30 @@ pub enum Texture {
         /// Edge of a square in units of uv, above 0.
         size: f64,
     },
+    /// A colour that changes evenly along a line, and stays the same across it and beyond its ends.
+    Gradient {
+        /// Colour at the start.
+        from: Rgb,
+        /// Colour at the end.
+        to: Rgb,
+        /// Where it starts, in uv.
+        start: [f64; 2],
+        /// Where it ends, elsewhere than `start`.
+        end: [f64; 2],
+    },
+    /// Clouds of two colours: Perlin's gradient noise, several octaves of it, each of half the size and half the strength of the one before.
+    Noise {
+        /// Colour where the noise is lowest.
+        low: Rgb,
+        /// Colour where it is highest.
+        high: Rgb,
+        /// Distance of the largest octave's knots in units of uv, above 0.
+        size: f64,
+        /// 1 to 16.
+        octaves: u32,
+        /// Chooses the pattern.
+        seed: u64,
+    },
     /// An image file (PNG, JPEG or Radiance HDR), bilinearly interpolated; its first row lies at v = 0 (glTF's convention).
     Image {
         /// The file.

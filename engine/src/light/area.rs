@@ -190,11 +190,10 @@ impl Cone {
         let squared = way.length_squared();
         let sin2 = sphere.radius * sphere.radius / squared;
         // Not a number is inside too.
-        if !(sin2 < 1.0) {
-            return None;
-        }
-        let distance = squared.sqrt();
-        Some(Self { axis: way * (1.0 / distance), distance, sin2 })
+        (sin2 < 1.0).then(|| {
+            let distance = squared.sqrt();
+            Self { axis: way * (1.0 / distance), distance, sin2 }
+        })
     }
 }
 

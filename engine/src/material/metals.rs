@@ -13,7 +13,8 @@ const METALS: [Metal; 10] = [
     // 70 % copper, 30 % zinc.
     ("brass", [0.444, 0.527, 1.094], [3.695, 2.765, 1.829]),
     ("chromium", [3.177, 3.181, 2.323], [3.329, 3.329, 3.135]),
-    ("copper", [0.271, 0.677, 1.316], [3.609, 2.625, 2.292]),
+    // At 549 nm (Johnson and Christy, "Optical Constants of the Noble Metals", 1972): at 550 nm other films are paler.
+    ("copper", [0.271, 1.02, 1.316], [3.609, 2.59, 2.292]),
     ("gold", [0.183, 0.421, 1.373], [3.424, 2.346, 1.770]),
     ("iron", [2.911, 2.950, 2.585], [3.089, 2.932, 2.767]),
     // About 633, 546 and 450 nm, two digits (Palik, "Handbook of Optical Constants of Solids", 1985).

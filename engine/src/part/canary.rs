@@ -114,7 +114,7 @@ pub(super) fn in_all_light(mut frame: Frame) -> Frame {
     let scene = &mut frame.scene;
     let image = match &scene.textures[1] {
         Texture::Image { file, .. } => *file,
-        Texture::Checker { .. } => AssetId([0; 32]),
+        _ => AssetId([0; 32]),
     };
     scene.materials = vec![
         Material::RoughDiffuse { reflectance: [0.9; 3], texture: Some(0), roughness: 0.5 },

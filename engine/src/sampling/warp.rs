@@ -3,7 +3,7 @@
 //! All are continuous or nearly so, so that stratified numbers give stratified points, and finite on all of [0, 1)^2. Directions are about +z.
 
 use glam::{DVec2, DVec3};
-use std::f64::consts::{FRAC_PI_4, PI, TAU};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// Sine and cosine of `u` turns, 2 pi u radians, to within 4e-16 each, for |u| < 2^48.
 ///

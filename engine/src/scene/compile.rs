@@ -202,7 +202,7 @@ fn light(light: &description::Light) -> Result<Light> {
 fn texture(texture: &description::Texture, assets: &dyn AssetSource) -> Result<Texture> {
     let source = match texture {
         description::Texture::Image { source, .. } => *source,
-        description::Texture::Checker { .. } => SourceId::default(),
+        _ => SourceId::default(),
     };
     Texture::compile(texture, assets).map_err(|error| CompileError::asset(source, error))
 }

@@ -3,6 +3,7 @@
 mod compile;
 mod emitters;
 mod error;
+mod explain;
 mod forest;
 mod geometry;
 mod identity;

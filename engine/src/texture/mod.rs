@@ -2,6 +2,7 @@
 
 mod coordinates;
 mod image;
+mod noise;
 mod srgb;
 mod wrap;
 #[cfg(test)]
@@ -31,6 +32,30 @@ pub enum Texture {
         /// Edge of a square.
         size: f64,
     },
+    /// A colour that changes along a line.
+    Gradient {
+        /// Colour at the start.
+        from: Rgb,
+        /// Colour at the end.
+        to: Rgb,
+        /// Where it starts.
+        start: DVec2,
+        /// What a place from there is multiplied by to tell how far along the line it is.
+        along: DVec2,
+    },
+    /// Clouds.
+    Noise {
+        /// Colour where the noise is lowest.
+        low: Rgb,
+        /// Colour where it is highest.
+        high: Rgb,
+        /// Distance of the largest octave's knots.
+        size: f64,
+        /// Octaves.
+        octaves: u32,
+        /// Chooses the pattern.
+        seed: u64,
+    },
     /// An image, bilinearly interpolated in linear light.
     Image {
         /// Its pixels.
@@ -50,6 +75,20 @@ impl Texture {
     pub fn compile(texture: &description::Texture, assets: &dyn AssetSource) -> Result<Self, AssetError> {
         match texture {
             description::Texture::Checker { even, odd, size } => Ok(Self::Checker { even: *even, odd: *odd, size: *size }),
+            description::Texture::Gradient { from, to, start, end } => {
+                let (start, way) = (DVec2::from(*start), DVec2::from(*end) - DVec2::from(*start));
+                let along = way / way.length_squared();
+                if !(start.is_finite() && along.is_finite()) {
+                    return Err(AssetError::new("the gradient's start and end must be finite, and not the same"));
+                }
+                Ok(Self::Gradient { from: *from, to: *to, start, along })
+            }
+            description::Texture::Noise { low, high, size, octaves, seed } => {
+                if !(*size > 0.0 && size.is_finite() && (1..=16).contains(octaves)) {
+                    return Err(AssetError::new("the noise's size must be above 0, and its octaves 1 to 16"));
+                }
+                Ok(Self::Noise { low: *low, high: *high, size: *size, octaves: *octaves, seed: *seed })
+            }
             description::Texture::Image { file, color_space, wrap, .. } => {
                 let bytes = assets.bytes(*file).ok_or_else(|| AssetError::new(format!("the image's bytes ({file}) are not here")))?;
                 Ok(Self::Image { image: Arc::new(Image::decode(&bytes, *color_space)?), wrap: *wrap, coordinates: Coordinates::default() })
@@ -61,16 +100,16 @@ impl Texture {
     #[inline]
     pub fn at(&self, uvs: [DVec2; 2]) -> [f32; 4] {
         match self {
-            Self::Checker { .. } => self.rgba(uvs[0]),
             Self::Image { coordinates, .. } => self.rgba(coordinates.of(uvs)),
+            _ => self.rgba(uvs[0]),
         }
     }
 
     /// Which coordinates of a surface it takes.
     pub fn coordinates(&self) -> Coordinates {
         match self {
-            Self::Checker { .. } => Coordinates::default(),
             Self::Image { coordinates, .. } => *coordinates,
+            _ => Coordinates::default(),
         }
     }
 
@@ -84,6 +123,8 @@ impl Texture {
                 let [r, g, b] = if (square * 0.5).floor() == square * 0.5 { *even } else { *odd };
                 [r, g, b, 1.0]
             }
+            Self::Gradient { from, to, start, along } => between(*from, *to, (uv - *start).dot(*along).clamp(0.0, 1.0)),
+            Self::Noise { low, high, size, octaves, seed } => between(*low, *high, noise::fractal(uv / *size, *octaves, *seed)),
             Self::Image { image, wrap, .. } => bilinear(image, *wrap, uv),
         }
     }
@@ -91,10 +132,16 @@ impl Texture {
     /// Whether some place of it may not be opaque.
     pub fn has_opacity(&self) -> bool {
         match self {
-            Self::Checker { .. } => false,
             Self::Image { image, .. } => image.has_opacity(),
+            _ => false,
         }
     }
+}
+
+/// A colour between two others, opaque.
+fn between(low: Rgb, high: Rgb, share: f64) -> [f32; 4] {
+    let [r, g, b] = std::array::from_fn(|i| (1.0 - share as f32) * low[i] + share as f32 * high[i]);
+    [r, g, b, 1.0]
 }
 
 fn bilinear(image: &Image, wrap: [Wrap; 2], uv: DVec2) -> [f32; 4] {

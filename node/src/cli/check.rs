@@ -1,7 +1,10 @@
 //! `tessera check`: runs a job script and says what would be rendered.
 
 use serde::Serialize;
-use tessera_engine::{description::Render, scene::Statistics};
+use tessera_engine::{
+    description::Render,
+    scene::{Scene, Statistics},
+};
 
 use super::script::Script;
 use crate::{
@@ -25,7 +28,7 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     let (job, scene) = args.script.load()?;
     let parts = try_policies(&job.description)?;
-    let summary = Summary::of(&job, &scene.build().statistics, parts)?;
+    let summary = Summary::of(&job, &scene.build(), parts)?;
     if args.json {
         let text = serde_json::to_string_pretty(&summary);
         println!("{}", text.map_err(|error| Error::new(ExitCode::Internal, format!("the summary cannot be coded: {error}")))?);
@@ -44,6 +47,8 @@ struct Summary {
     samples: u32,
     seed: u64,
     render: String,
+    /// What rendering it will compute.
+    modelled: Vec<String>,
     probe: String,
     split: String,
     parts: usize,
@@ -79,7 +84,7 @@ struct Contents {
 }
 
 impl Summary {
-    fn of(job: &LoadedJob, statistics: &Statistics, parts: usize) -> Result<Self> {
+    fn of(job: &LoadedJob, scene: &Scene, parts: usize) -> Result<Self> {
         let JobDescription { name, frame, output, probe, split, assign, warnings, .. } = &job.description;
         let hash = frame.hash().map_err(|error| Error::new(ExitCode::Internal, format!("the frame cannot be coded: {error}")))?;
         Ok(Self {
@@ -95,7 +100,8 @@ impl Summary {
             assign: assign_words(*assign).to_owned(),
             outputs: [Some(&output.exr), output.png.as_ref(), Some(&output.manifest)].into_iter().flatten().cloned().collect(),
             image_hash: hash.to_string(),
-            scene: Contents::of(job, statistics),
+            modelled: scene.explain(),
+            scene: Contents::of(job, &scene.statistics),
             warnings: warnings.clone(),
             frames: job.frames.map(|(frame, frames)| format!("{frame} alone, of {frames}; --set frame=NUMBER checks another")),
         })
@@ -114,7 +120,12 @@ impl Summary {
             ("output", self.outputs.join(", ")),
             ("image_hash", self.image_hash.clone()),
         ];
-        lines.iter().for_each(|(what, value)| text.push_str(&format!("  {what:<11} {value}\n")));
+        for (what, value) in &lines {
+            text.push_str(&format!("  {what:<11} {value}\n"));
+            if *what == "render" {
+                self.modelled.iter().for_each(|line| text.push_str(&format!("  {:<11} {line}\n", "")));
+            }
+        }
         self.warnings.iter().for_each(|warning| text.push_str(&format!("warning: {warning}\n")));
         text
     }

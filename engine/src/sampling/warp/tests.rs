@@ -1,5 +1,7 @@
 //! Tests of [`super`].
 
+use std::f64::consts::PI;
+
 use super::*;
 use crate::{math, sampling::Sampler};
 

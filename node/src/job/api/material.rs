@@ -148,7 +148,7 @@ fn color_or_texture(field: Field) -> mlua::Result<(Rgb, Option<Texture>)> {
 
 fn texture_or(field: Field, color: impl FnOnce(&Field) -> mlua::Result<Rgb>) -> mlua::Result<(Rgb, Option<Texture>)> {
     if field.value.is_userdata() {
-        let texture = field.thing("a colour or a texture (tessera.checker or tessera.image)", |handle| match &handle.thing {
+        let texture = field.thing("a colour or a texture (tessera.checker, gradient, noise or image)", |handle| match &handle.thing {
             Thing::Texture(texture) => Some(texture.clone()),
             _ => None,
         })?;

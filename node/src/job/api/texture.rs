@@ -3,14 +3,16 @@
 use mlua::Value;
 use tessera_engine::description::{ColorSpace, Texture, Wrap};
 
-use super::{Form, Function, model::asset};
+use super::{Form, Function, material::BRIGHTEST, model::asset};
 use crate::job::{
     handle::Thing,
-    keys::{Field, Keys, POSITIVE},
+    keys::{FINITE, Field, Keys, POSITIVE},
 };
 
 pub const FUNCTIONS: &[Function] = &[
     Function { path: "checker", form: Form::Table, keys: &["even", "odd", "size", "name"], make: checker },
+    Function { path: "gradient", form: Form::Table, keys: &["from", "to", "start", "end", "name"], make: gradient },
+    Function { path: "noise", form: Form::Table, keys: &["low", "high", "size", "octaves", "seed", "name"], make: noise },
     Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "name"], make: image },
 ];
 
@@ -19,6 +21,26 @@ fn checker(keys: &Keys) -> mlua::Result<Value> {
     let odd = keys.or("odd", [0.2; 3], |field| field.color(1.0))?;
     let size = keys.or("size", 1.0, |field| field.number(POSITIVE))?;
     keys.make(|_| Thing::Texture(Texture::Checker { even, odd, size }))
+}
+
+fn gradient(keys: &Keys) -> mlua::Result<Value> {
+    let from = keys.or("from", [0.0; 3], |field| field.color(BRIGHTEST))?;
+    let to = keys.or("to", [1.0; 3], |field| field.color(BRIGHTEST))?;
+    let start = keys.or("start", [0.0, 1.0], |field| field.numbers::<2>(FINITE))?;
+    let end = keys.or("end", [0.0, 0.0], |field| field.numbers::<2>(FINITE))?;
+    if start == end {
+        return Err(keys.fault("`start` and `end` must be different places").into());
+    }
+    keys.make(|_| Thing::Texture(Texture::Gradient { from, to, start, end }))
+}
+
+fn noise(keys: &Keys) -> mlua::Result<Value> {
+    let low = keys.or("low", [0.0; 3], |field| field.color(BRIGHTEST))?;
+    let high = keys.or("high", [1.0; 3], |field| field.color(BRIGHTEST))?;
+    let size = keys.or("size", 1.0, |field| field.number(POSITIVE))?;
+    let octaves = keys.or("octaves", 4, |field| field.integer32(1, 16))?;
+    let seed = keys.or("seed", 0, |field| field.integer(0, 1 << 53))?;
+    keys.make(|_| Thing::Texture(Texture::Noise { low, high, size, octaves, seed }))
 }
 
 fn image(keys: &Keys) -> mlua::Result<Value> {
