@@ -82,6 +82,10 @@ impl Estimate {
             return (0.0, 1.0);
         }
         let t = difference.mean / difference.error();
+        // Few numbers tell nothing of their skewness.
+        if difference.freedom < 50.0 {
+            return (t, two_sided(t, difference.freedom));
+        }
         (t, two_sided(without_skewness(t, difference.third / difference.error().powi(3)), difference.freedom))
     }
 }
