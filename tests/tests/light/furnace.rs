@@ -9,7 +9,7 @@ use tessera_tests::{
     stage::{Stage, diffuse, ground, lamp, path, point, rectangle, sphere},
 };
 
-use super::{assert_exactly, assert_is};
+use super::{assert_alike, assert_exactly, assert_is};
 
 const SKY: Rgb = [1.0, 2.0, 0.5];
 
@@ -75,6 +75,26 @@ fn what_is_rough_and_white_is_hardly_seen_in_an_even_sky() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// Chains that end by chance show in the mean what chains that never do show: also where the same surface chooses between reflection and refraction.
+#[test]
+fn roulette_changes_nothing_but_noise() {
+    let colored = |roughness| {
+        let (reflectance, transmittance) = ([0.4, 0.5, 0.6], [0.9, 0.7, 0.8]);
+        Material::Glass { ior: 2.0, reflectance, transmittance, roughness, multiple_scattering: true, interior: None, priority: 0 }
+    };
+    let gilded = Material::Metal { fresnel: Fresnel::Schlick([0.9, 0.6, 0.3]), roughness: [0.7; 2], multiple_scattering: true };
+    for (what, material) in [("smooth glass", colored(0.0)), ("rough glass", colored(0.5)), ("metal", gilded)] {
+        // From below comes another light than from above, so that it matters where a chain goes.
+        let seen = |render| {
+            let floor = rectangle([-9.0, -1.5, 9.0], [18.0, 0.0, 0.0], [0.0, 0.0, -18.0]);
+            let stage = Stage::new().with(sphere([0.0; 3], 1.0), material.clone()).with(floor, diffuse([0.3, 0.2, 0.1])).within(SKY);
+            stage.seen([0.2, 0.9, 3.0], [0.4, 0.35, 0.0], render, 512)
+        };
+        let never = seen(path(60));
+        assert_alike(what, seen(Render::Path { max_depth: 60, roulette_depth: 1 }), never);
+    }
 }
 
 /// Within a white sphere of albedo rho with a lamp of radius r in its middle, every point sees the lamp under the share F = r^2 and itself everywhere else: `B = rho (F L + (1 - F) B)`.
