@@ -8,3 +8,6 @@ pub mod relay;
 pub mod rig;
 pub mod load;
 pub mod s1;
+pub mod seeds;
+pub mod stage;
+pub mod statistics;
