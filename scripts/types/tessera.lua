@@ -345,7 +345,7 @@ function tessera.metal(keys) end
 ---@field reflectance? tessera.Color multiplies what is reflected
 ---@field transmittance? tessera.Color multiplies what is refracted, once at every surface
 ---@field interior? tessera.Medium what fills it, for path: colours it by thickness
----@field priority? number where closed objects of glass overlap, the one of highest priority is there and the borders of the others do not show (give a glass a higher one than the water that reaches a little into it); of equal ones, that which the ray entered last
+---@field priority? number where closed objects of glass overlap, the one of highest priority is there and the borders of the others do not show (give a glass a higher one than the water, and let the water reach a little into it: where two faces lie in the same place, only one of them is met); of equal ones, that which the ray entered last
 ---@field multiple_scattering? boolean as for metals
 ---@field name? string for messages
 

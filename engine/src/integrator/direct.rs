@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::rgb;
 use crate::{
     material::Material,
-    scene::{Surface, Tracer},
-    shape::Ray,
+    scene::Tracer,
+    shape::{Ray, Surface},
 };
 
 /// The albedo of a surface: its reflectance, texture and vertex colour.

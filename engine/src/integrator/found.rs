@@ -7,8 +7,8 @@ use super::rgb;
 use crate::{
     light::{Arriving, Vertex},
     material::{Emission, Recipe},
-    scene::{Inside, Surface, Tracer},
-    shape::Ray,
+    scene::{Inside, Tracer},
+    shape::{Ray, Surface},
 };
 
 /// The vertex that a ray comes from, and the density by solid angle with which it was sent: what lights need to know that could have been chosen there instead.

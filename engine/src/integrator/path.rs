@@ -7,8 +7,8 @@ use crate::{
     light::{Arriving, Vertex},
     material::{Bsdf, Material, Medium, MetallicRoughness, Recipe, Scattered, Travel},
     sampling::Sampler,
-    scene::{Inside, Scene, Surface, Tracer},
-    shape::Ray,
+    scene::{Inside, Scene, Tracer},
+    shape::{Ray, Surface},
 };
 
 /// Unidirectional path tracing with next-event estimation (Kajiya, "The Rendering Equation", 1986; Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th ed., 13.4 and 14.2): at

@@ -5,7 +5,8 @@ use glam::{DVec2, DVec3};
 use crate::{
     material::{Bsdf, Material, Scattered},
     math::orthonormal_basis,
-    scene::{Scene, Surface},
+    scene::Scene,
+    shape::Surface,
 };
 
 /// A BSDF and the frame that it stands in.

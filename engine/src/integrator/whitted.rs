@@ -9,8 +9,8 @@ use crate::{
         dielectric::{interface, reflect},
     },
     sampling::Sampler,
-    scene::{Surface, Tracer},
-    shape::Ray,
+    scene::Tracer,
+    shape::{Ray, Surface},
 };
 
 /// "An Improved Illumination Model for Shaded Display" (Whitted, 1980), "higher rank" of Vokorokos et al. (2010).

@@ -6,7 +6,7 @@ use super::rgb;
 use crate::{
     assets::{Anisotropy, Clearcoat, ModelMaterial, NormalMap, Sheen, Specular, Transmission, Volume},
     math::{ln, sin_cos},
-    scene::Surface,
+    shape::Surface,
     texture::Texture,
 };
 

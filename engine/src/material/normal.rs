@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::{assets, scene::Surface, texture::Texture};
+use crate::{assets, shape::Surface, texture::Texture};
 
 /// A normal map (glTF 2.0, section 3.9.3, `normalTexture`).
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     assets::ModelMaterial,
     description::{self, Material as Description},
-    scene::Surface,
+    shape::Surface,
     texture::Texture,
 };
 

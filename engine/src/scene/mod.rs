@@ -21,11 +21,12 @@ mod visit;
 #[cfg(test)]
 mod tests;
 
+pub use crate::shape::Surface;
 pub use error::{CompileError, Warning};
 pub use inside::Inside;
 pub use query::Hit;
 pub use statistics::Statistics;
-pub use surface::{Crossing, Surface};
+pub use surface::Crossing;
 pub use tracer::{Tracer, Work};
 pub use unbuilt::Unbuilt;
 

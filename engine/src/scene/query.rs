@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use glam::{DVec2, DVec3};
 
 use super::{
-    Scene,
+    Scene, Surface,
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
-    surface::{Crossing, Surface, in_world},
+    surface::{Crossing, in_world},
     tracer::{Tracer, Work},
 };
 #[cfg(target_arch = "x86_64")]

@@ -11,6 +11,7 @@ pub mod plane;
 mod ray;
 pub mod rectangle;
 pub mod sphere;
+mod surface;
 pub mod triangle;
 
 pub use cone::Cone;
@@ -21,6 +22,7 @@ pub use plane::Plane;
 pub use ray::Ray;
 pub use rectangle::Rectangle;
 pub use sphere::Sphere;
+pub use surface::Surface;
 
 use glam::{DVec2, DVec3};
 

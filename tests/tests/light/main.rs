@@ -5,6 +5,7 @@
 mod alike;
 mod closed;
 mod furnace;
+mod media;
 mod ranges;
 mod together;
 
