@@ -11,7 +11,7 @@ pub(super) fn fractal(uv: DVec2, octaves: u32, seed: u64) -> f64 {
     for octave in 0..octaves {
         sum += strength * gradient_noise(at, seed ^ u64::from(octave) << 56);
         whole += strength;
-        at = at * 2.0;
+        at *= 2.0;
         strength *= 0.5;
     }
     (0.5 + 0.5 * sum / whole).clamp(0.0, 1.0)
