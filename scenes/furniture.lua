@@ -9,6 +9,8 @@ local OAK = tessera.plastic { reflectance = { 0.40, 0.235, 0.115 }, roughness = 
 local DARK_OAK = tessera.plastic { reflectance = { 0.16, 0.085, 0.045 }, roughness = 0.35 }
 local BRASS = tessera.metal { metal = "brass", roughness = 0.25 }
 
+local WHITE = tessera.plastic { reflectance = 0.8, roughness = 0.15 }
+
 local function matte(code) return tessera.diffuse { reflectance = tessera.hex(code) } end
 
 local function placed(place, objects)
@@ -118,7 +120,7 @@ function furniture.pendant(place, drop)
     return placed(place, {
         forms.mesh(forms.lathe(dome), tessera.plastic { reflectance = tessera.hex("#24464f"), roughness = 0.2 }, nil, "dome"),
         tessera.cylinder { from = { 0, 0.26, 0 }, to = { 0, drop, 0 }, radius = 0.004, material = matte("#202020"), name = "cable" },
-        tessera.sphere { center = { 0, 0.07, 0 }, radius = 0.05, material = tessera.emitter { radiance = { 0.9, 0.62, 0.34 } }, name = "bulb" },
+        tessera.sphere { center = { 0, 0.07, 0 }, radius = 0.05, material = WHITE, name = "bulb" },
     })
 end
 

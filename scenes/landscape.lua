@@ -119,6 +119,24 @@ local function meadow(count)
     return tessera.group(grass)
 end
 
+-- Boulders in the meadow, larger farther away, where they lie on the shore.
+local function boulders(count)
+    local random, kinds, group = tessera.random(12), {}, {}
+    for i = 1, 4 do
+        kinds[i] = vegetation.boulder(i)
+    end
+    for _ = 1, count do
+        local z = -6 - 130 * random:uniform() ^ 2
+        local x = half_width(z) * random:uniform(-0.8, 0.8)
+        local size = random:uniform(0.3, 0.9) * (1 - z / 45)
+        table.insert(group, tessera.instance {
+            group = random:choice(kinds),
+            transform = tessera.translate(x, height(x, z), z) * tessera.rotate({ 0, 1, 0 }, random:uniform(0, 360)) * tessera.scale(size),
+        })
+    end
+    return tessera.group(group)
+end
+
 -- `groves` of 14 trees, `squares` of 100 tufts; `detail` is the number of points along the terrain's edges.
 function landscape.scene(options)
     local water = tessera.plastic { reflectance = { 0.006, 0.018, 0.02 }, ior = 1.33, roughness = 0.13 }
@@ -127,6 +145,7 @@ function landscape.scene(options)
             terrain(options.detail or 420),
             forest(options.groves or 7500),
             meadow(options.squares or 9000),
+            boulders(90),
             tessera.rectangle { center = { 0, 0, -700 }, edge_u = { 3000, 0, 0 }, edge_v = { 0, 0, -1500 }, material = water, name = "lake" },
         },
         -- Late afternoon: from the left and a little from behind, so that slopes show their shape.

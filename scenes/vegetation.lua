@@ -2,6 +2,7 @@
 
 local tessera = require("tessera")
 local forms = require("scenes.forms")
+local noise = require("scenes.noise")
 
 local vegetation = {}
 
@@ -14,7 +15,7 @@ local function conifer(random, height, width, needles)
         for _, number in { x, y, z } do table.insert(positions, number) end
         return #positions // 3 - 1
     end
-    local skirts, points = 8, 9
+    local skirts, points = 13, 11
     for skirt = 0, skirts - 1 do
         local t = skirt / skirts
         local top, reach = height * (0.24 + 0.76 * (t + 1.3 / skirts)), width * (1 - t) ^ 0.85 + 0.12
@@ -23,7 +24,7 @@ local function conifer(random, height, width, needles)
         for i = 0, 2 * points - 1 do
             local angle = turn + math.pi * i / points
             local out = reach * (if i % 2 == 0 then random:uniform(0.8, 1.1) else 0.55)
-            table.insert(rim, vertex(out * math.cos(angle), height * (0.14 + 0.76 * t) - 0.1 * out, out * math.sin(angle)))
+            table.insert(rim, vertex(out * math.cos(angle), height * (0.14 + 0.76 * t) - 0.22 * out, out * math.sin(angle)))
         end
         for i, corner in rim do
             for _, k in { tip, rim[i % #rim + 1], corner } do table.insert(triangles, k) end
@@ -93,6 +94,18 @@ function vegetation.meadow(seed, count, edge)
         })
     end
     return tessera.group(tufts)
+end
+
+-- A boulder, about one metre across: a ball with a coarse and a fine unevenness.
+function vegetation.boulder(seed)
+    local rows, columns = 16, 24
+    local ball = forms.sheet(rows, columns, function(row, column)
+        local up, around = math.pi * row / (rows - 1), 2 * math.pi * column / columns
+        local x, y, z = math.sin(up) * math.cos(around), -math.cos(up), -math.sin(up) * math.sin(around)
+        local radius = 0.5 + 0.3 * noise.plane(1.3 * x + 9 * seed, 1.3 * z + 1.1 * y) + 0.12 * noise.plane(4 * x + y, 4 * z - 3 * y + seed)
+        return 1.2 * radius * x, 0.8 * radius * y, radius * z
+    end, true)
+    return tessera.group { forms.mesh(ball, matte("#7b766c"), nil, "boulder") }
 end
 
 return vegetation
