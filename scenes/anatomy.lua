@@ -8,11 +8,11 @@ local anatomy = {}
 
 local TABLE = -9 -- its height; the forearm stands in a plinth on it
 
--- Resin: light goes about two centimetres before it is scattered, mostly forwards, and turns amber on its way.
+-- Resin: light goes more than three centimetres before it is scattered, mostly forwards, and turns amber on its way.
 local RESIN = tessera.glass {
     ior = 1.36,
     roughness = 0.22,
-    interior = tessera.medium { absorption = { 0.010, 0.11, 0.24 }, scattering = { 0.42, 0.40, 0.36 }, anisotropy = 0.6, name = "resin" },
+    interior = tessera.medium { absorption = { 0.006, 0.075, 0.17 }, scattering = { 0.28, 0.27, 0.25 }, anisotropy = 0.6, name = "resin" },
 }
 local BRASS = tessera.metal { metal = "brass", roughness = 0.25 }
 local EBONY = tessera.plastic { reflectance = { 0.02, 0.014, 0.011 }, roughness = 0.25 }
@@ -52,7 +52,7 @@ local function lamp()
         table.insert(ring, { center[1] + (radius + 0.3) * math.cos(angle), center[2] + (radius + 0.3) * math.sin(angle), center[3] })
     end
     return tessera.group {
-        tessera.disc { center = center, normal = { 0, 0, 1 }, radius = radius, material = tessera.emitter { radiance = { 1.25, 1.05, 0.8 } }, name = "lamp" },
+        tessera.disc { center = center, normal = { 0, 0, 1 }, radius = radius, material = tessera.emitter { radiance = { 1.1, 0.92, 0.7 } }, name = "lamp" },
         forms.mesh(forms.tube(ring, 0.35, 24), BRASS, nil, "ring of the lamp"),
         tessera.cylinder { from = { center[1], TABLE, center[3] }, to = { center[1], center[2] - radius, center[3] }, radius = 0.5, material = BRASS, name = "foot" },
         tessera.cylinder { from = { center[1], TABLE, center[3] }, to = { center[1], TABLE + 0.5, center[3] }, radius = 4, material = BRASS, name = "foot" },
@@ -76,7 +76,7 @@ function anatomy.scene(options)
             tessera.rectangle { corner = { -120, -60, -45 }, edge_u = { 240, 0, 0 }, edge_v = { 0, 150, 0 }, material = tessera.diffuse { reflectance = { 0.10, 0.16, 0.18 } }, name = "wall" },
             -- A weak window in front shows the surfaces that the lamp does not reach.
             tessera.rectangle {
-                center = { 0, 0, 0 }, edge_u = { -40, 0, 0 }, edge_v = { 0, 36, 0 }, material = tessera.emitter { radiance = { 3.6, 4.0, 4.6 } },
+                center = { 0, 0, 0 }, edge_u = { -40, 0, 0 }, edge_v = { 0, 36, 0 }, material = tessera.emitter { radiance = { 7.5, 8.0, 8.6 } },
                 transform = tessera.look_at({ 30, 26, 42 }, { 0, 4, 0 }), name = "fill",
             },
         },

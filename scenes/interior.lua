@@ -1,4 +1,4 @@
--- A room in the morning: sun and sky come in through two windows, fall on a table that is laid for tea, and light the rest from there.
+-- A room in the morning: sun and sky come in through two windows and the open side behind the camera, fall on a table that is laid for tea, and light the rest from there.
 -- One unit is a metre; the windows are in the wall at the left, the camera looks from the room's front to its back.
 
 local tessera = require("tessera")

@@ -5,8 +5,6 @@ local forms = require("scenes.forms")
 
 local studio = {}
 
-studio.RADIUS = 1.5
-
 local PAPER = tessera.diffuse { reflectance = { 0.42, 0.43, 0.45 } }
 local BLACK = tessera.plastic { reflectance = 0.018, roughness = 0.3 }
 local STEEL = tessera.metal { metal = "aluminium", roughness = { 0.2, 0.45 } }
@@ -28,7 +26,7 @@ end
 
 -- The plate turns; its marks of ten degrees show how far.
 local function plate(angle)
-    local edge = forms.spline({ { 0, 0 - 0.14 }, { 1.45, -0.14 }, { 1.5, -0.12 }, { 1.5, -0.02 }, { 1.48, 0 }, { 1.48, 0 }, { 0, 0 } }, 5)
+    local edge = forms.spline({ { 0, -0.14 }, { 1.45, -0.14 }, { 1.5, -0.12 }, { 1.5, -0.02 }, { 1.48, 0 }, { 1.48, 0 }, { 0, 0 } }, 5)
     local objects = { forms.mesh(forms.lathe(edge, 180), BLACK, nil, "plate") }
     for mark = 0, 35 do
         local wide = if mark % 9 == 0 then 0.03 else 0.012

@@ -34,7 +34,7 @@ local function conifer(random, height, width, needles)
     return tessera.group { forms.mesh(forms.smooth(positions, triangles), needles), trunk }
 end
 
--- A grove: trees within a circle, of which two neighbours in three are dark and one is golden.
+-- A grove: trees of six shapes within a circle; `golden` is the share of the shapes that are larches in autumn.
 function vegetation.grove(seed, count, radius, golden)
     local random = tessera.random(seed)
     local dark = { matte("#1d3320"), matte("#26402a"), matte("#182b20") }

@@ -1,4 +1,4 @@
--- A city at dusk across a river: more than ten thousand lights, each of them a light source.
+-- A city at dusk across a river: about eight thousand windows and lamps, each of them a light source.
 local tessera = require("tessera")
 local city = require("scenes.city")
 

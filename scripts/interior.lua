@@ -1,4 +1,4 @@
--- A room in the morning, lit by nothing but sun and sky through its windows.
+-- A room in the morning, lit by nothing but sun and sky through two windows and an open side behind the camera.
 local tessera = require("tessera")
 local interior = require("scenes.interior")
 

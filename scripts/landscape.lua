@@ -1,4 +1,4 @@
--- A mountain lake in autumn, a million plants:  --set squares=90000 makes it ten million.
+-- A mountain lake in autumn, a million plants; `groves` (of 14 trees) and `squares` (of 100 tufts) make it smaller or larger.
 local tessera = require("tessera")
 local landscape = require("scenes.landscape")
 
