@@ -30,9 +30,10 @@ local function forest(count)
         if z > -260 and x > 0.34 * z - 4 and x < -0.62 * z then continue end
         local golden = noise.plane(x / 170, z / 170) > 0.12
         local grove = groves[if golden then random:integer(6, 8) else random:integer(1, 5)]
+        if height(x, z) <= 3 then continue end -- in the water
         local tree, y, slope = lay(grove, x, z, 6)
-        -- Not in the water, not on cliffs, thinner towards the tree line, with clearings.
-        if y > 3 and slope < 1 and y < terrain.TREE_LINE * random:uniform(0.5, 1) and noise.fractal(x / 130, z / 130, 3) > -0.28 then
+        -- Not on cliffs, thinner towards the tree line, with clearings.
+        if slope < 1 and y < terrain.TREE_LINE * random:uniform(0.5, 1) and noise.fractal(x / 130, z / 130, 3) > -0.28 then
             table.insert(trees, tree)
         end
     end

@@ -20,7 +20,11 @@ end
 -- Height of the ground: a meadow at the eye, a basin for the lake, hills around it, mountains behind.
 function terrain.height(x, z)
     local mountains = smoothstep(-1000, -2900, z) + 0.55 * smoothstep(350, 1500, math.abs(x + 80)) * smoothstep(-150, -700, z)
-    local y = 14 + 430 * mountains * (noise.ridged(x / 1300 + 3.1, z / 1300 + 0.4, 8) - 0.25)
+    local y = 14
+    -- Where there are none, as around the eye, the time for them is saved.
+    if mountains > 0 then
+        y += 430 * mountains * (noise.ridged(x / 1300 + 3.1, z / 1300 + 0.4, 8) - 0.25)
+    end
     y += (6 + 34 * smoothstep(-80, -500, z)) * noise.fractal(x / 240, z / 240, 5)
     -- The eye stands on a rise above the shore.
     y += 30 * smoothstep(-150, -5, z)
