@@ -1,7 +1,10 @@
 //! `tessera check`: runs a job script and says what would be rendered.
 
 use serde::Serialize;
-use tessera_engine::{description::Render, scene::Statistics};
+use tessera_engine::{
+    description::{Aov, Render},
+    scene::Statistics,
+};
 
 use super::script::Script;
 use crate::{
@@ -49,6 +52,9 @@ struct Summary {
     parts: usize,
     assign: String,
     outputs: Vec<String>,
+    /// What the picture tells beside colours.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    aovs: Vec<&'static str>,
     image_hash: String,
     scene: Contents,
     warnings: Vec<String>,
@@ -94,6 +100,7 @@ impl Summary {
             parts,
             assign: assign_words(*assign).to_owned(),
             outputs: [Some(&output.exr), output.png.as_ref(), Some(&output.manifest)].into_iter().flatten().cloned().collect(),
+            aovs: frame.aovs.iter().map(Aov::name).collect(),
             image_hash: hash.to_string(),
             scene: Contents::of(job, statistics),
             warnings: warnings.clone(),
@@ -105,7 +112,7 @@ impl Summary {
         let Self { name, width, height, samples, seed, .. } = self;
         let mut text = format!("{name}: {width} x {height} pixels, {samples} samples each, seed {seed}\n");
         self.frames.iter().for_each(|frames| text.push_str(&format!("  {:<11} {frames}\n", "frame")));
-        let lines = [
+        let mut lines = vec![
             ("scene", self.scene.text()),
             ("render", self.render.clone()),
             ("probe", self.probe.clone()),
@@ -114,6 +121,9 @@ impl Summary {
             ("output", self.outputs.join(", ")),
             ("image_hash", self.image_hash.clone()),
         ];
+        if !self.aovs.is_empty() {
+            lines.insert(lines.len() - 1, ("aovs", self.aovs.join(", ")));
+        }
         lines.iter().for_each(|(what, value)| text.push_str(&format!("  {what:<11} {value}\n")));
         self.warnings.iter().for_each(|warning| text.push_str(&format!("warning: {warning}\n")));
         text
