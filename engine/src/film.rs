@@ -1,6 +1,9 @@
 //! The film: the whole frame, put together from parts.
 
-use crate::part::{Rect, RenderedPart};
+use crate::{
+    description::Aovs,
+    part::{Rect, RenderedPart},
+};
 
 /// The pixels of a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -8,9 +11,12 @@ pub struct Film {
     width: u32,
     height: u32,
     pixels: Vec<[f32; 3]>,
+    aovs: Aovs,
+    /// Their numbers, pixel by pixel.
+    extra: Vec<f32>,
 }
 
-/// A part that lies beyond the film, or whose pixels are not as many as its rectangle says.
+/// A part that lies beyond the film, whose pixels are not as many as its rectangle says, or who holds other numbers beside colours.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("a part of {pixels} pixels at {rect:?} does not fit on a film of {width} x {height} pixels")]
 pub struct Misplaced {
@@ -27,12 +33,24 @@ pub struct Misplaced {
 impl Film {
     /// A black film.
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, pixels: vec![[0.0; 3]; width as usize * height as usize] }
+        Self::with_aovs(width, height, Aovs::NONE)
+    }
+
+    /// A film that holds these numbers beside colours too; all are 0.
+    pub fn with_aovs(width: u32, height: u32, aovs: Aovs) -> Self {
+        let area = width as usize * height as usize;
+        Self { width, height, pixels: vec![[0.0; 3]; area], aovs, extra: vec![0.0; area * aovs.numbers()] }
     }
 
     /// A film of these pixels, row by row from the top; `None` if they are not `width * height`.
     pub fn from_pixels(width: u32, height: u32, pixels: Vec<[f32; 3]>) -> Option<Self> {
-        (pixels.len() as u64 == u64::from(width) * u64::from(height)).then_some(Self { width, height, pixels })
+        Self::from_numbers(width, height, pixels, Aovs::NONE, Vec::new())
+    }
+
+    /// The same with numbers beside colours, pixel by pixel; `None` if they are not as many as they should be.
+    pub fn from_numbers(width: u32, height: u32, pixels: Vec<[f32; 3]>, aovs: Aovs, extra: Vec<f32>) -> Option<Self> {
+        let fits = pixels.len() as u64 == u64::from(width) * u64::from(height) && extra.len() == pixels.len() * aovs.numbers();
+        fits.then_some(Self { width, height, pixels, aovs, extra })
     }
 
     /// Columns.
@@ -50,6 +68,16 @@ impl Film {
         &self.pixels
     }
 
+    /// What it holds beside colours.
+    pub fn aovs(&self) -> Aovs {
+        self.aovs
+    }
+
+    /// Their numbers, pixel by pixel, each in the order of [`Aovs::channels`].
+    pub fn extra(&self) -> &[f32] {
+        &self.extra
+    }
+
     /// Puts a part at its place, over what was there.
     ///
     /// # Errors
@@ -58,7 +86,8 @@ impl Film {
         let Rect { x, y, width, height } = part.rect;
         let inside =
             x.checked_add(width).is_some_and(|right| right <= self.width) && y.checked_add(height).is_some_and(|low| low <= self.height);
-        if !inside || part.pixels.len() as u64 != part.rect.area() {
+        let numbers = self.aovs.numbers();
+        if !inside || part.pixels.len() as u64 != part.rect.area() || part.extra.len() != part.pixels.len() * numbers {
             return Err(Misplaced { rect: part.rect, pixels: part.pixels.len(), width: self.width, height: self.height });
         }
         if part.pixels.is_empty() {
@@ -68,37 +97,48 @@ impl Film {
         for (row, part_row) in rows.zip(part.pixels.chunks_exact(width as usize)) {
             row[x as usize..][..width as usize].copy_from_slice(part_row);
         }
+        if numbers > 0 {
+            let rows = self.extra.chunks_exact_mut(self.width as usize * numbers).skip(y as usize);
+            for (row, part_row) in rows.zip(part.extra.chunks_exact(width as usize * numbers)) {
+                row[x as usize * numbers..][..part_row.len()].copy_from_slice(part_row);
+            }
+        }
         Ok(())
     }
 
-    /// BLAKE3 of the pixels: little-endian f32, red, green, blue, row by row from the top.
+    /// BLAKE3 of the pixels: little-endian f32, red, green, blue, row by row from the top; behind each row the numbers that it has beside colours.
     pub fn hash(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
-        self.pixels.chunks(self.width.max(1) as usize).for_each(|row| hash_row(&mut hasher, row));
+        let width = self.width.max(1) as usize;
+        let numbers = width * self.aovs.numbers();
+        for (y, row) in self.pixels.chunks(width).enumerate() {
+            hash_row(&mut hasher, row.as_flattened());
+            hash_row(&mut hasher, &self.extra[y * numbers..][..numbers]);
+        }
         *hasher.finalize().as_bytes()
     }
 }
 
-/// Adds a row to a hash of pixels.
-pub(crate) fn hash_row(hasher: &mut blake3::Hasher, row: &[[f32; 3]]) {
-    // A few pixels at a time: as many bytes as lie on the stack.
-    for pixels in row.chunks(256) {
-        let mut bytes = [0; 256 * 12];
+/// Adds numbers of a row to a hash of pixels.
+pub(crate) fn hash_row(hasher: &mut blake3::Hasher, row: &[f32]) {
+    // A few numbers at a time: as many bytes as lie on the stack.
+    for numbers in row.chunks(768) {
+        let mut bytes = [0; 768 * 4];
         let (places, _) = bytes.as_chunks_mut::<4>();
-        places.iter_mut().zip(pixels.iter().flatten()).for_each(|(place, number)| *place = number.to_le_bytes());
-        hasher.update(&bytes[..pixels.len() * 12]);
+        places.iter_mut().zip(numbers).for_each(|(place, number)| *place = number.to_le_bytes());
+        hasher.update(&bytes[..numbers.len() * 4]);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::part::Counters;
+    use crate::{description::Aov, part::Counters};
 
     /// A part whose pixels tell their own place.
     fn part(x: u32, y: u32, width: u32, height: u32) -> RenderedPart {
         let pixels = (0..height).flat_map(|row| (0..width).map(move |column| [(x + column) as f32, (y + row) as f32, 1.0])).collect();
-        RenderedPart { rect: Rect { x, y, width, height }, pixels, counters: Counters::default() }
+        RenderedPart { rect: Rect { x, y, width, height }, pixels, extra: Vec::new(), counters: Counters::default() }
     }
 
     #[test]
@@ -112,6 +152,28 @@ mod tests {
         parts.iter().for_each(|part| other.place(part).unwrap());
         assert_eq!(film.hash(), other.hash());
         assert_ne!(film.hash(), Film::new(7, 5).hash());
+    }
+
+    #[test]
+    fn numbers_beside_colours_come_along() {
+        let aovs: Aovs = [Aov::Depth, Aov::Error].into_iter().collect();
+        let with = |x: u32, y: u32, width: u32, height: u32| {
+            let extra = (0..height).flat_map(|row| (0..width).flat_map(move |column| [(x + column) as f32, (y + row) as f32, 2.0, 3.0]));
+            RenderedPart { extra: extra.collect(), ..part(x, y, width, height) }
+        };
+        let mut film = Film::with_aovs(7, 5, aovs);
+        [with(3, 0, 4, 5), with(0, 2, 3, 3), with(0, 0, 3, 2)].iter().for_each(|part| film.place(part).unwrap());
+        assert!(film.extra().chunks(4).enumerate().all(|(i, numbers)| *numbers == [(i % 7) as f32, (i / 7) as f32, 2.0, 3.0]));
+        let mut whole = Film::with_aovs(7, 5, aovs);
+        whole.place(&with(0, 0, 7, 5)).unwrap();
+        assert_eq!(film.hash(), whole.hash());
+        let mut plain = Film::new(7, 5);
+        plain.place(&part(0, 0, 7, 5)).unwrap();
+        assert_ne!(plain.hash(), whole.hash());
+        assert!(plain.place(&with(0, 0, 1, 1)).is_err() && whole.place(&part(0, 0, 1, 1)).is_err());
+        let again = Film::from_numbers(7, 5, whole.pixels().to_vec(), aovs, whole.extra().to_vec()).unwrap();
+        assert_eq!(again.hash(), whole.hash());
+        assert!(Film::from_numbers(7, 5, whole.pixels().to_vec(), aovs, Vec::new()).is_none());
     }
 
     #[test]

@@ -76,6 +76,7 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@field png? string|false a preview; false: none
 ---@field pixel_type? "float"|"half" 32 or 16 bits a number in the EXR
 ---@field exposure? number brightness of the preview: radiance is multiplied by 2^exposure
+---@field aovs? ("albedo"|"normal"|"depth"|"position"|"object"|"material"|"samples"|"error")[] what the EXR tells of each pixel beside its colour
 
 -- @api job: frames
 ---@class tessera.Frames

@@ -1,8 +1,8 @@
 //! Scene S1, "whitted": the scene that POV-Ray is compared on, built from its definition in numbers.
 
 use tessera_engine::description::{
-    Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId,
-    Texture,
+    Aovs, Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, Object, ObjectKind, Quality, Render, Scene, Shape,
+    SourceId, Texture,
 };
 
 /// One sphere of the scene.
@@ -99,5 +99,6 @@ pub fn frame(width: u32, height: u32) -> Frame {
         render: Render::Whitted { max_depth: 8, transparent_shadows: true, min_weight: 1.0 / 255.0 },
         quality: Quality { samples: 1 },
         seed: 0,
+        aovs: Aovs::NONE,
     }
 }

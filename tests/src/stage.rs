@@ -5,8 +5,8 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DVec3;
 use tessera_engine::{
     description::{
-        Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, MemoryAssets, MeshData, Object, ObjectKind, Quality,
-        Render, Rgb, Scene as Description, Shape, SourceId,
+        Aovs, Camera, Environment, Falloff, Film, Filter, Frame, Group, Light, Material, MemoryAssets, MeshData, Object, ObjectKind,
+        Quality, Render, Rgb, Scene as Description, Shape, SourceId,
     },
     scene::Scene,
 };
@@ -131,7 +131,7 @@ impl Stage {
 
     /// The frame that a camera sees.
     pub fn frame(&self, camera: Camera, film: Film, render: Render) -> Frame {
-        Frame { scene: self.scene.clone(), camera, film, render, quality: Quality { samples: 1 }, seed: 1 }
+        Frame { scene: self.scene.clone(), camera, film, render, quality: Quality { samples: 1 }, seed: 1, aovs: Aovs::NONE }
     }
 
     /// The scene compiled for that.

@@ -4,6 +4,7 @@ use std::{fs, net::SocketAddr, path::Path};
 
 use tessera_engine::{
     REVISION,
+    description::Aovs,
     part::{self, Counters, Rect, RenderedPart},
 };
 use tessera_node::{
@@ -22,7 +23,7 @@ const LIFE: Incarnation = Incarnation(7);
 /// The bytes and the hash of a black part, and then one bit of the bytes flipped.
 fn flipped(rect: Rect) -> (Vec<u8>, [u8; 32]) {
     let mut bytes = vec![0; usize::try_from(rect.area() * 12).unwrap()];
-    let hash = RenderedPart::from_bytes(rect, Counters::default(), &bytes).unwrap().hash();
+    let hash = RenderedPart::from_bytes(rect, Aovs::NONE, Counters::default(), &bytes).unwrap().hash();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
     (bytes, hash)

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Camera, Environment, Film, Group, GroupId, Light, Material, Medium, Quality, Render, Texture};
+use super::{Aovs, Camera, Environment, Film, Group, GroupId, Light, Material, Medium, Quality, Render, Texture};
 use crate::REVISION;
 
 /// All that decides the pixels of one frame.
@@ -22,6 +22,8 @@ pub struct Frame {
     pub quality: Quality,
     /// Chooses the sample pattern.
     pub seed: u64,
+    /// What it tells beside colours.
+    pub aovs: Aovs,
 }
 
 /// Shapes, materials, textures and lights. Materials, textures and groups are referred to by index.
@@ -65,7 +67,11 @@ impl Frame {
     /// # Errors
     /// None in practice: a frame holds no type that postcard cannot code.
     pub fn hash(&self) -> Result<FrameHash, postcard::Error> {
-        let coded = postcard::to_stdvec(self)?;
+        let mut coded = postcard::to_stdvec(self)?;
+        if self.aovs.is_empty() {
+            // The last byte says only that there are none: pictures without them are called what they were called before there were such.
+            coded.pop();
+        }
         let mut hasher = blake3::Hasher::new_derive_key("tessera frame identity");
         hasher.update(&REVISION.to_le_bytes());
         hasher.update(&coded);

@@ -3,6 +3,7 @@
 //! Units: lengths in scene units, angles in degrees, colours linear Rec. 709 RGB, right-handed world. A [`Frame`] is *all that is
 //! pictured*; where each object came from stands apart in [`Sources`], so that moving a line of a script does not change an image's identity.
 
+mod aov;
 mod asset;
 mod camera;
 mod environment;
@@ -16,6 +17,7 @@ mod render;
 mod source;
 mod texture;
 
+pub use aov::{Aov, Aovs};
 pub use asset::{AssetError, AssetId, AssetSource, MemoryAssets, MeshData};
 pub use camera::Camera;
 pub use environment::Environment;

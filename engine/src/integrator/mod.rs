@@ -1,6 +1,7 @@
 //! Integrators: how much light comes along a ray.
 
 mod direct;
+mod first;
 mod found;
 mod path;
 mod raycast;
@@ -9,6 +10,7 @@ mod whitted;
 
 use glam::DVec3;
 
+pub use first::{First, first};
 pub use path::Path;
 pub use raycast::Raycast;
 pub use whitted::Whitted;

@@ -38,7 +38,7 @@ mod set {
 }
 
 /// Surfaces without effect that a ray goes through before it is given up: objects that touch everywhere would hold it forever.
-const MOST_PASSED: u32 = 10_000;
+pub(super) const MOST_PASSED: u32 = 10_000;
 
 /// A path as far as it is known.
 struct Walk {
@@ -286,7 +286,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
 
 /// How a surface scatters light at a point, and the turn of its tangent; `None` if it cannot be seen there. `room` is where a large model is put, so that small ones stay small.
 #[inline(always)]
-fn bsdf<'s: 'r, 'r>(
+pub(super) fn bsdf<'s: 'r, 'r>(
     scene: &'s Scene,
     material: &'s Material,
     surface: &Surface,

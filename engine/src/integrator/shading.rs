@@ -26,10 +26,7 @@ impl<'s> Shading<'s> {
     #[inline(always)]
     pub fn new(bsdf: Bsdf<'s>, turn: DVec2, scene: &Scene, material: &Material, surface: &Surface, direction: DVec3) -> Self {
         let outside = direction.dot(surface.ng) < 0.0;
-        // A shading normal that looks away from the viewer tells nothing about what is seen.
-        let seen = |normal: &DVec3| (direction.dot(*normal) < 0.0) == outside;
-        let mapped = material.normal_map.as_ref().and_then(|map| map.normal(&scene.textures, surface)).filter(seen);
-        let z = mapped.unwrap_or(if seen(&surface.ns) { surface.ns } else { surface.ng });
+        let z = normal(scene, Some(material), surface, direction);
         let (x, y) = match material.tangents.and_then(|_| surface.tangents_across(z)) {
             Some((x, y)) => (x * turn.x + y * turn.y, y * turn.x - x * turn.y),
             None => orthonormal_basis(z),
@@ -60,4 +57,15 @@ impl<'s> Shading<'s> {
         let to_outside = direction.dot(self.ng) > 0.0;
         ((to_outside == self.outside) != scattered.transmitted).then_some((scattered, direction))
     }
+}
+
+/// The shading normal at the end of a ray along `direction`, on the outward side, as the bumps of a material bend it.
+#[inline(always)]
+pub fn normal(scene: &Scene, bumpy: Option<&Material>, surface: &Surface, direction: DVec3) -> DVec3 {
+    let outside = direction.dot(surface.ng) < 0.0;
+    // A shading normal that looks away from the viewer tells nothing about what is seen.
+    let seen = |normal: &DVec3| (direction.dot(*normal) < 0.0) == outside;
+    let map = bumpy.and_then(|material| material.normal_map.as_ref());
+    let mapped = map.and_then(|map| map.normal(&scene.textures, surface)).filter(seen);
+    mapped.unwrap_or(if seen(&surface.ns) { surface.ns } else { surface.ng })
 }

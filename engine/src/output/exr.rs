@@ -31,11 +31,11 @@ use serde::{Deserialize, Serialize};
 use super::{OutputError, Rows, write_atomically, zip::Compressor};
 use crate::{
     REVISION,
-    description::FrameHash,
+    description::{Aov, Aovs, FrameHash},
     film::{self, Film},
 };
 
-/// How the file holds its numbers.
+/// How the file holds its colours; what a frame tells beside them is always held as floats.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelType {
     /// 32-bit floats: the film's own.
@@ -75,7 +75,7 @@ const HALF_MAX: f32 = 65_504.0;
 pub struct Written {
     /// BLAKE3 of the pixels as they stand in the file, in the order of [`Film::hash`].
     pub hash: [u8; 32],
-    /// Numbers that were too large for a half float and were clamped.
+    /// Numbers of colours that were too large for a half float and were clamped.
     pub clamped: u64,
 }
 
@@ -84,8 +84,9 @@ pub struct Written {
 /// # Errors
 /// If the file cannot be written, or rows cannot be read; an older file then stays as it was.
 pub fn write(path: &Path, mut picture: impl Rows, pixel_type: PixelType, identity: &Identity) -> Result<Written, OutputError> {
-    let header = header(picture.size(), pixel_type, identity);
-    let mut chunks = Chunks::new(pixel_type);
+    let channels = channels(picture.aovs());
+    let header = header(picture.size(), &channels, pixel_type, identity);
+    let mut chunks = Chunks::new(channels, pixel_type);
     write_atomically(path, |file| {
         let write = |_, writer: &mut _| chunks.write(writer, &mut picture);
         block::write(file, [header?].into_iter().collect(), true, write).map_err(io_error)
@@ -96,15 +97,33 @@ pub fn write(path: &Path, mut picture: impl Rows, pixel_type: PixelType, identit
 /// Rows of one chunk of the compression ZIP16.
 const ROWS: usize = 16;
 
-/// Channels in the order of the file, which is that of their names, and where a pixel of the film holds them.
-const CHANNELS: [(&str, usize); 3] = [("B", 2), ("G", 1), ("R", 0)];
+/// Where a pixel of the film holds a channel.
+#[derive(Clone, Copy)]
+enum Place {
+    /// Among the components of its colour.
+    Color(usize),
+    /// Among the numbers beside it.
+    Beside(usize),
+}
 
-fn header((width, height): (u32, u32), pixel_type: PixelType, identity: &Identity) -> io::Result<Header> {
+/// Channels in the order of the file, which is that of their names.
+fn channels(aovs: Aovs) -> Vec<(&'static str, Place)> {
+    let colors = ["R", "G", "B"].into_iter().enumerate().map(|(component, name)| (name, Place::Color(component)));
+    let mut channels: Vec<_> = colors.chain(aovs.channels().enumerate().map(|(number, name)| (name, Place::Beside(number)))).collect();
+    channels.sort_by_key(|(name, _)| *name);
+    channels
+}
+
+fn header((width, height): (u32, u32), channels: &[(&str, Place)], pixel_type: PixelType, identity: &Identity) -> io::Result<Header> {
     let sample_type = match pixel_type {
         PixelType::Float => SampleType::F32,
         PixelType::Half => SampleType::F16,
     };
-    let channels = CHANNELS.map(|(name, _)| ChannelDescription::named(name, sample_type)).into_iter().collect();
+    let described = channels.iter().map(|(name, place)| match place {
+        Place::Color(_) => ChannelDescription::named(*name, sample_type),
+        Place::Beside(_) => ChannelDescription::named(*name, SampleType::F32),
+    });
+    let channels = described.collect();
     let mut header = Header::new(text(ATTRIBUTE)?, (width as usize, height as usize), channels)
         .with_encoding(Compression::ZIP16, BlockDescription::ScanLines, LineOrder::Increasing)
         .with_attributes(LayerAttributes::default());
@@ -118,6 +137,7 @@ fn header((width, height): (u32, u32), pixel_type: PixelType, identity: &Identit
 
 /// Makes chunks out of rows. The crate would compress them by itself, but four times slower than [`Compressor`] for files that are not much smaller.
 struct Chunks {
+    channels: Vec<(&'static str, Place)>,
     pixel_type: PixelType,
     compressor: Compressor,
     hasher: blake3::Hasher,
@@ -130,19 +150,25 @@ struct Chunks {
 }
 
 impl Chunks {
-    fn new(pixel_type: PixelType) -> Self {
+    fn new(channels: Vec<(&'static str, Place)>, pixel_type: PixelType) -> Self {
         let (numbers, halves, bytes) = (Vec::new(), Vec::new(), Vec::new());
-        Self { pixel_type, compressor: Compressor::new(), hasher: blake3::Hasher::new(), clamped: 0, numbers, halves, bytes }
+        Self { channels, pixel_type, compressor: Compressor::new(), hasher: blake3::Hasher::new(), clamped: 0, numbers, halves, bytes }
     }
 
     fn write(&mut self, writer: &mut impl ChunksWriter, picture: &mut impl Rows) -> Result<(), Error> {
         let (width, height) = picture.size();
+        let numbers = picture.aovs().numbers();
         let mut band = vec![[0.0; 3]; width as usize * ROWS.min(height as usize)];
+        let mut extra = vec![0.0; band.len() * numbers];
         for (index, y) in (0..height).step_by(ROWS).enumerate() {
             let band = &mut band[..width as usize * ROWS.min((height - y) as usize)];
-            picture.read(y, band)?;
+            let extra = &mut extra[..band.len() * numbers];
+            picture.read(y, band, extra)?;
             self.bytes.clear();
-            band.chunks_mut(width as usize).for_each(|row| self.add(row));
+            let width = width as usize;
+            for (row, pixels) in band.chunks_mut(width).enumerate() {
+                self.add(pixels, &extra[row * width * numbers..][..width * numbers]);
+            }
             let compressed_pixels_le = self.compressor.compress(&self.bytes);
             let block = CompressedScanLineBlock { y_coordinate: y as i32, compressed_pixels_le };
             writer.write_chunk(index, Chunk { layer_index: 0, compressed_block: CompressedBlock::ScanLine(block) })?;
@@ -151,20 +177,24 @@ impl Chunks {
     }
 
     /// Adds a row to the chunk, channel by channel, and to the hash as it then stands in the file.
-    fn add(&mut self, row: &mut [[f32; 3]]) {
-        for (_, component) in CHANNELS {
+    fn add(&mut self, row: &mut [[f32; 3]], extra: &[f32]) {
+        for (_, place) in &self.channels {
             self.numbers.clear();
-            self.numbers.extend(row.iter().map(|pixel| pixel[component]));
-            match self.pixel_type {
-                PixelType::Float => append(&mut self.bytes, &self.numbers, f32::to_le_bytes),
-                PixelType::Half => {
+            match *place {
+                Place::Color(component) => self.numbers.extend(row.iter().map(|pixel| pixel[component])),
+                Place::Beside(number) => self.numbers.extend(extra.iter().skip(number).step_by(extra.len() / row.len())),
+            }
+            match (self.pixel_type, *place) {
+                (PixelType::Half, Place::Color(component)) => {
                     self.clamped += round_to_halves(&mut self.numbers, &mut self.halves);
                     append(&mut self.bytes, &self.halves, f16::to_le_bytes);
                     row.iter_mut().zip(&self.halves).for_each(|(pixel, half)| pixel[component] = half.to_f32());
                 }
+                _ => append(&mut self.bytes, &self.numbers, f32::to_le_bytes),
             }
         }
-        film::hash_row(&mut self.hasher, row);
+        film::hash_row(&mut self.hasher, row.as_flattened());
+        film::hash_row(&mut self.hasher, extra);
     }
 }
 
@@ -210,7 +240,7 @@ pub struct Picture {
     pub identity: Option<Identity>,
 }
 
-/// Reads the channels R, G and B of a file's first layer.
+/// Reads the channels R, G and B of a file's first layer, and those beside them whose names this program gives.
 ///
 /// # Errors
 /// If the file cannot be read or has no such channels.
@@ -271,16 +301,24 @@ type FlatImage = Image<Layer<AnyChannels<FlatSamples>>>;
 
 fn film_of(image: &FlatImage) -> io::Result<Film> {
     let channels = &image.layer_data.channel_data.list;
+    let find = |name: &str| channels.iter().find(|channel| Text::eq(&channel.name, name) && channel.sampling == Vec2(1, 1));
     let channel = |name: &str| {
-        let found = channels.iter().find(|channel| Text::eq(&channel.name, name) && channel.sampling == Vec2(1, 1));
-        let found = found.ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, format!("it has no channel {name}")))?;
+        let found = find(name).ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, format!("it has no channel {name}")))?;
         io::Result::Ok(found.sample_data.values_as_f32().collect::<Vec<f32>>())
     };
     let (red, green, blue) = (channel("R")?, channel("G")?, channel("B")?);
+    let is_whole = |aov: &Aov| aov.channels().iter().all(|name| find(name).is_some());
+    let aovs: Aovs = Aov::ALL.into_iter().filter(is_whole).collect();
+    let mut extra = vec![0.0; red.len() * aovs.numbers()];
+    for (number, name) in aovs.channels().enumerate() {
+        let places = extra.iter_mut().skip(number).step_by(aovs.numbers());
+        places.zip(channel(name)?).for_each(|(place, read)| *place = read);
+    }
     let pixels = red.iter().zip(&green).zip(&blue).map(|((&r, &g), &b)| [r, g, b]).collect();
     let Vec2(width, height) = image.layer_data.size;
     let size = u32::try_from(width).ok().zip(u32::try_from(height).ok());
-    size.and_then(|(width, height)| Film::from_pixels(width, height, pixels)).ok_or_else(|| io::Error::from(io::ErrorKind::InvalidData))
+    let film = size.and_then(|(width, height)| Film::from_numbers(width, height, pixels, aovs, extra));
+    film.ok_or_else(|| io::Error::from(io::ErrorKind::InvalidData))
 }
 
 #[cfg(test)]
@@ -345,6 +383,31 @@ mod tests {
         assert_eq!(floats(value("chromaticities", "chromaticities")), [0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329]);
         let json: serde_json::Value = serde_json::from_slice(value("tessera", "string")).unwrap();
         assert_eq!(json, serde_json::json!({"image_hash": "ab".repeat(32), "seed": u64::MAX, "engine_revision": REVISION}));
+    }
+
+    /// Numbers beside colours stay floats, to the bit, whatever the colours become; and the file is the same as ever where there are none.
+    #[test]
+    fn what_is_told_beside_colours_comes_back_to_the_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.exr");
+        for aovs in
+            [Aov::ALL.into_iter().collect::<Aovs>(), [Aov::Object].into_iter().collect(), [Aov::Normal, Aov::Depth].into_iter().collect()]
+        {
+            let extra =
+                (0..37 * 21 * aovs.numbers()).map(|i| if i % 3 == 0 { 16_777_215.0 - i as f32 } else { -1.0 / (i as f32 + 1.0) }).collect();
+            let film = Film::from_numbers(37, 21, film().pixels().to_vec(), aovs, extra).unwrap();
+            for pixel_type in [PixelType::Float, PixelType::Half] {
+                let written = write(&path, &film, pixel_type, &identity()).unwrap();
+                let read = read(&path).unwrap().film;
+                assert_eq!((read.aovs(), read.hash()), (aovs, written.hash));
+                assert!(read.extra() == film.extra());
+                assert_eq!(read.pixels() == film.pixels(), pixel_type == PixelType::Float);
+            }
+            let headers = MetaData::read_from_file(&path, false).unwrap().headers;
+            let names: Vec<String> = headers[0].channels.list.iter().map(|channel| channel.name.to_string()).collect();
+            assert_eq!(names.len(), 3 + aovs.numbers());
+            assert!(names.is_sorted(), "{names:?}");
+        }
     }
 
     #[test]

@@ -41,7 +41,7 @@ fn encode(file: &mut impl Write, mut picture: impl Rows, holes: &[[u32; 4]], exp
     let mut stream = writer.stream_writer_with_size(CHUNK_BYTES)?;
     let (mut row, mut bytes) = (vec![[0.0; 3]; width as usize], Vec::new());
     for y in 0..height {
-        picture.read(y, &mut row)?;
+        picture.read(y, &mut row, &mut [])?;
         bytes.clear();
         bytes.extend(row.iter().flatten().map(|&component| quantizer.byte(f64::from(component) * scale)));
         holes.iter().for_each(|hole| mark(&mut bytes, y, *hole));

@@ -9,7 +9,7 @@ use super::{Rect, RenderedPart, SampleRange, render};
 use crate::{
     accel::{Content, Identity, LeafRule, Tree, Triangles},
     description::{
-        AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, Fresnel, Group, Light, Material, Matrix, Medium,
+        Aovs, AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, Fresnel, Group, Light, Material, Matrix, Medium,
         MemoryAssets, MeshData, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     scene,
@@ -104,6 +104,7 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
         render: Render::Whitted { max_depth: 6, transparent_shadows: true, min_weight: 0.0 },
         quality: Quality { samples: 2 },
         seed,
+        aovs: Aovs::NONE,
     };
     Ok((frame, assets))
 }

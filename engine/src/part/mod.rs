@@ -1,10 +1,14 @@
 //! Parts: what a node is asked to render, and the rendering of one.
 
+mod aovs;
 mod canary;
 mod counters;
 mod pairwise;
 mod render;
 mod rendered;
+mod spread;
+#[cfg(test)]
+mod aovs_tests;
 #[cfg(test)]
 mod tests;
 

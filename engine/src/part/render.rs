@@ -4,24 +4,28 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DVec2, DVec3};
 
-use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange};
+use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange, aovs, spread::Spread};
 use crate::{
-    description::Render,
+    description::{Aov, Render},
     integrator::{Integrator, Path, Raycast, Whitted},
     sampling::Sampler,
     scene::{Scene, Tracer, Work},
+    shape::Ray,
 };
 
 /// Renders the samples of a range in every pixel of a rectangle. A pixel is the mean of its samples, summed by [`PairwiseSum`]. A sample that is
-/// invalid (a component is negative or no finite number) counts as black, so that it cannot spoil the pixel, and is counted.
+/// invalid (a component is negative or no finite number) counts as black, so that it cannot spoil the pixel, and is counted. What the frame tells beside
+/// colours comes along.
 ///
 /// The pixels depend on the scene, the rectangle and the range alone.
 ///
 /// # Errors
 /// If `cancel` was set meanwhile; it is looked at once a row.
 pub fn render(scene: &Scene, rect: Rect, samples: SampleRange, cancel: &AtomicBool) -> Result<RenderedPart, Cancelled> {
-    let (pixels, counters) = trace(scene, Lattice { rect, stride: 1 }, samples, cancel)?;
-    Ok(RenderedPart { rect, pixels, counters })
+    let lattice = Lattice { rect, stride: 1 };
+    let Traced { pixels, errors, counters } = trace(scene, lattice, samples, cancel)?;
+    let extra = aovs::gather(scene, lattice, samples, &errors, cancel)?;
+    Ok(RenderedPart { rect, pixels, extra, counters })
 }
 
 /// Renders sample 0 of some pixels of a rectangle to learn how long the whole takes: those in the middle of squares of `stride` pixels, at least
@@ -30,23 +34,25 @@ pub fn render(scene: &Scene, rect: Rect, samples: SampleRange, cancel: &AtomicBo
 /// # Errors
 /// If `cancel` was set meanwhile; it is looked at once a row.
 pub fn probe(scene: &Scene, cell: Rect, stride: u32, cancel: &AtomicBool) -> Result<u64, Cancelled> {
-    let (_, counters) = trace(scene, Lattice { rect: cell, stride }, SampleRange { first: 0, count: 1 }, cancel)?;
+    let (lattice, samples) = (Lattice { rect: cell, stride }, SampleRange { first: 0, count: 1 });
+    let Traced { errors, counters, .. } = trace(scene, lattice, samples, cancel)?;
+    aovs::gather(scene, lattice, samples, &errors, cancel)?;
     Ok(counters.camera_rays)
 }
 
 /// Pixels in the middle of squares of `stride` pixels of a rectangle.
 #[derive(Clone, Copy)]
-struct Lattice {
+pub struct Lattice {
     rect: Rect,
     stride: u32,
 }
 
 impl Lattice {
-    fn columns(self) -> impl Iterator<Item = u32> {
+    pub fn columns(self) -> impl Iterator<Item = u32> {
         middles(self.rect.x, self.rect.width, self.stride)
     }
 
-    fn rows(self) -> impl Iterator<Item = u32> {
+    pub fn rows(self) -> impl Iterator<Item = u32> {
         middles(self.rect.y, self.rect.height, self.stride)
     }
 }
@@ -57,9 +63,14 @@ fn middles(first: u32, length: u32, stride: u32) -> impl Iterator<Item = u32> {
     (0..length / stride).map(move |step| first + step * stride + stride / 2)
 }
 
-type Pixels = (Vec<[f32; 3]>, Counters);
+/// Colours of pixels, and their standard errors, if they are asked for.
+struct Traced {
+    pixels: Vec<[f32; 3]>,
+    errors: Vec<DVec3>,
+    counters: Counters,
+}
 
-fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicBool) -> Result<Pixels, Cancelled> {
+fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicBool) -> Result<Traced, Cancelled> {
     match scene.render {
         Render::Raycast => scene.run(Tracing::new(Raycast, lattice, samples, cancel)),
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
@@ -83,14 +94,18 @@ struct Tracing<'c, I> {
     share: f64,
     cancel: &'c AtomicBool,
     sum: PairwiseSum,
+    /// Where errors are asked for.
+    spread: Option<Box<Spread>>,
     counters: Counters,
 }
 
 impl<I: Integrator> Work for Tracing<'_, I> {
-    type Output = Result<Pixels, Cancelled>;
+    type Output = Result<Traced, Cancelled>;
 
     #[inline(always)]
     fn run(mut self, scene: impl Tracer) -> Self::Output {
+        self.spread = scene.aovs.contains(Aov::Error).then(Box::default);
+        let mut errors = Vec::new();
         let mut pixels = Vec::with_capacity(self.lattice.rows().size_hint().0 * self.lattice.columns().size_hint().0);
         for y in self.lattice.rows() {
             if self.cancel.load(Ordering::Relaxed) {
@@ -99,25 +114,29 @@ impl<I: Integrator> Work for Tracing<'_, I> {
             for x in self.lattice.columns() {
                 let pixel = self.pixel(scene, (x, y));
                 pixels.push(pixel);
+                errors.extend(self.spread.as_ref().map(|spread| spread.standard_error()));
             }
         }
         let rays = self.integrator.counts();
-        Ok((pixels, Counters { shadow_rays: rays.shadow, secondary_rays: rays.secondary, ..self.counters }))
+        let counters = Counters { shadow_rays: rays.shadow, secondary_rays: rays.secondary, ..self.counters };
+        Ok(Traced { pixels, errors, counters })
     }
 }
 
 impl<'c, I: Integrator> Tracing<'c, I> {
     fn new(integrator: I, lattice: Lattice, samples: SampleRange, cancel: &'c AtomicBool) -> Self {
         let share = 1.0 / samples.count as f64;
-        Self { integrator, lattice, samples, share, cancel, sum: PairwiseSum::default(), counters: Counters::default() }
+        Self { integrator, lattice, samples, share, cancel, sum: PairwiseSum::default(), spread: None, counters: Counters::default() }
     }
 
     #[inline(always)]
     fn pixel(&mut self, scene: impl Tracer, pixel: (u32, u32)) -> [f32; 3] {
         self.sum.clear();
+        self.spread.iter_mut().for_each(|spread| spread.clear());
         for index in self.samples.first..self.samples.first + self.samples.count {
             let radiance = self.sample(scene, pixel, index);
             self.sum.push(radiance);
+            self.spread.iter_mut().for_each(|spread| spread.push(radiance));
         }
         let mean = self.sum.total() * self.share;
         // Finite in f64, but perhaps not in f32.
@@ -128,10 +147,7 @@ impl<'c, I: Integrator> Tracing<'c, I> {
     fn sample(&mut self, scene: impl Tracer, pixel: (u32, u32), index: u64) -> DVec3 {
         self.counters.camera_rays += 1;
         let sampler = Sampler::new(scene.seed, pixel, index);
-        let (offset, weight) = scene.filter.sample(sampler.pair(Sampler::FILM));
-        let (x, y) = (f64::from(pixel.0) + 0.5 + offset.x, f64::from(pixel.1) + 0.5 + offset.y);
-        let lens = if scene.camera.needs_lens() { sampler.pair(Sampler::LENS) } else { DVec2::ZERO };
-        let ray = scene.camera.ray(x, y, lens);
+        let (ray, weight) = camera_ray(&scene, pixel, &sampler);
         let radiance = self.integrator.radiance(scene, &ray, &sampler);
         if radiance.is_finite() && radiance.min_element() >= 0.0 {
             return radiance * weight;
@@ -139,6 +155,15 @@ impl<'c, I: Integrator> Tracing<'c, I> {
         self.counters.invalid_samples += 1;
         DVec3::ZERO
     }
+}
+
+/// The ray of a sample, and the weight of what it sees.
+#[inline(always)]
+pub fn camera_ray(scene: &Scene, pixel: (u32, u32), sampler: &Sampler) -> (Ray, f64) {
+    let (offset, weight) = scene.filter.sample(sampler.pair(Sampler::FILM));
+    let (x, y) = (f64::from(pixel.0) + 0.5 + offset.x, f64::from(pixel.1) + 0.5 + offset.y);
+    let lens = if scene.camera.needs_lens() { sampler.pair(Sampler::LENS) } else { DVec2::ZERO };
+    (scene.camera.ray(x, y, lens), weight)
 }
 
 #[cfg(test)]

@@ -9,8 +9,8 @@ use super::*;
 use crate::{
     accel::Simd,
     description::{
-        Camera, Environment, Falloff, Film as FilmDescription, Filter, Frame, Group, Light, Material, MemoryAssets, Object, ObjectKind,
-        Quality, Render, Rgb, Scene as SceneDescription, Shape, SourceId,
+        Aov, Aovs, Camera, Environment, Falloff, Film as FilmDescription, Filter, Frame, Group, Light, Material, MemoryAssets, Object,
+        ObjectKind, Quality, Render, Rgb, Scene as SceneDescription, Shape, SourceId,
     },
     film::Film,
     scene::Scene,
@@ -59,6 +59,7 @@ impl Look {
             render: self.render,
             quality: Quality { samples: 1 },
             seed: 0,
+            aovs: Aovs::NONE,
         };
         // Lights may be as near the floor as numbers go.
         let scene = Scene::compile_around(&frame, &MemoryAssets::default(), glam::DVec3::ZERO).unwrap();
@@ -189,10 +190,11 @@ fn an_invalid_sample_is_black_and_counted() {
 #[test]
 fn pixels_are_the_same_with_all_instructions() {
     let pixels = |scene: &dyn Fn() -> Scene, simd| {
-        let scene = scene().with_simd(simd);
+        let mut scene = scene().with_simd(simd);
+        scene.aovs = Aov::ALL.into_iter().collect();
         let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
         let part = render(&scene, rect, SampleRange { first: 0, count: scene.quality.samples.into() }, &AtomicBool::new(false)).unwrap();
-        part.pixels.into_iter().flatten().map(f32::to_bits).collect::<Vec<_>>()
+        part.pixels.into_iter().flatten().chain(part.extra).map(f32::to_bits).collect::<Vec<_>>()
     };
     assert_eq!(pixels(&busy, Simd::Baseline), pixels(&busy, Simd::detect()));
     assert_eq!(pixels(&busy_paths, Simd::Baseline), pixels(&busy_paths, Simd::detect()));
@@ -229,23 +231,26 @@ fn cut(rect: Rect, parts: &mut Vec<Rect>) {
 
 #[test]
 fn parts_of_any_size_in_any_order_give_the_same_bytes() {
-    [busy(), busy_paths()].iter().for_each(any_parts_give_the_same_bytes);
+    [busy(), busy_paths()].into_iter().for_each(any_parts_give_the_same_bytes);
 }
 
-fn any_parts_give_the_same_bytes(scene: &Scene) {
+fn any_parts_give_the_same_bytes(mut scene: Scene) {
     let go = AtomicBool::new(false);
     let (width, height) = (scene.film.width, scene.film.height);
     let all = Rect { x: 0, y: 0, width, height };
-    let mut whole = Film::new(width, height);
-    whole.place(&render(scene, all, WHOLE, &go).unwrap()).unwrap();
-
     let mut parts = Vec::new();
     cut(all, &mut parts);
     assert!(parts.len() > 20 && parts.iter().map(Rect::area).sum::<u64>() == all.area());
     parts.sort_by_key(|rect| (rect.x * 31 + rect.y * 17) % 13);
-    let mut film = Film::new(width, height);
-    parts.iter().for_each(|&rect| film.place(&render(scene, rect, WHOLE, &go).unwrap()).unwrap());
-    assert_eq!(film.hash(), whole.hash());
+
+    for aovs in [Aovs::NONE, Aov::ALL.into_iter().collect(), [Aov::Error].into_iter().collect()] {
+        scene.aovs = aovs;
+        let mut whole = Film::with_aovs(width, height, aovs);
+        whole.place(&render(&scene, all, WHOLE, &go).unwrap()).unwrap();
+        let mut film = Film::with_aovs(width, height, aovs);
+        parts.iter().for_each(|&rect| film.place(&render(&scene, rect, WHOLE, &go).unwrap()).unwrap());
+        assert_eq!(film.hash(), whole.hash(), "{aovs:?}");
+    }
 }
 
 #[test]

@@ -91,6 +91,7 @@ impl Scene {
             render: frame.render.clone(),
             quality: frame.quality.clone(),
             seed: frame.seed,
+            aovs: frame.aovs,
             statistics: Statistics::default(),
             materials: placed.materials,
             textures: placed.textures,

@@ -34,7 +34,7 @@ use glam::DVec3;
 
 use crate::{
     camera::Camera,
-    description::{Film, Quality, Render},
+    description::{Aovs, Film, Quality, Render},
     light::{Environment, Light, LightSampler},
     material::{Material, Medium, Recipe},
     sampling::PixelFilter,
@@ -72,6 +72,8 @@ pub struct Scene {
     pub quality: Quality,
     /// Chooses the sample pattern.
     pub seed: u64,
+    /// What the frame tells beside colours.
+    pub aovs: Aovs,
     /// What a user should know, each once.
     pub warnings: Vec<Warning>,
     /// What the scene is made of.

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use tessera_engine::{
-    description::Render,
+    description::{Aov, Render},
     scene::{Scene, Statistics},
 };
 
@@ -54,6 +54,9 @@ struct Summary {
     parts: usize,
     assign: String,
     outputs: Vec<String>,
+    /// What the picture tells beside colours.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    aovs: Vec<&'static str>,
     image_hash: String,
     scene: Contents,
     warnings: Vec<String>,
@@ -99,6 +102,7 @@ impl Summary {
             parts,
             assign: assign_words(*assign).to_owned(),
             outputs: [Some(&output.exr), output.png.as_ref(), Some(&output.manifest)].into_iter().flatten().cloned().collect(),
+            aovs: frame.aovs.iter().map(Aov::name).collect(),
             image_hash: hash.to_string(),
             modelled: scene.explain(),
             scene: Contents::of(job, &scene.statistics),
@@ -111,7 +115,7 @@ impl Summary {
         let Self { name, width, height, samples, seed, .. } = self;
         let mut text = format!("{name}: {width} x {height} pixels, {samples} samples each, seed {seed}\n");
         self.frames.iter().for_each(|frames| text.push_str(&format!("  {:<11} {frames}\n", "frame")));
-        let lines = [
+        let mut lines = vec![
             ("scene", self.scene.text()),
             ("render", self.render.clone()),
             ("probe", self.probe.clone()),
@@ -120,6 +124,9 @@ impl Summary {
             ("output", self.outputs.join(", ")),
             ("image_hash", self.image_hash.clone()),
         ];
+        if !self.aovs.is_empty() {
+            lines.insert(lines.len() - 1, ("aovs", self.aovs.join(", ")));
+        }
         for (what, value) in &lines {
             text.push_str(&format!("  {what:<11} {value}\n"));
             if *what == "render" {

@@ -43,7 +43,7 @@ pub fn frame(scene: &Scene, samples: u64, done: impl Fn(Rect) + Sync) -> Result<
 /// # Errors
 /// [`ExitCode::Internal`] where a part does not fit on the film.
 pub fn parts(scene: &Scene, rects: &[Rect], samples: u64, threads: usize, done: impl Fn(Rect) + Sync) -> Result<Film> {
-    let film = Mutex::new(Film::new(scene.film.width, scene.film.height));
+    let film = Mutex::new(Film::with_aovs(scene.film.width, scene.film.height, scene.aovs));
     share_out(rects, threads, |rect| {
         let rendered = part::render(scene, *rect, SampleRange { first: 0, count: samples }, &AtomicBool::new(false)).map_err(internal)?;
         film.lock().unwrap_or_else(PoisonError::into_inner).place(&rendered).map_err(internal)?;

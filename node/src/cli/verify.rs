@@ -7,6 +7,7 @@ use std::{
 
 use tessera_engine::{
     REVISION,
+    description::Aov,
     film::Film,
     output::exr::{self, Picture},
     part::{Counters, Rect, RenderedPart},
@@ -122,6 +123,10 @@ fn disagreements(manifest: &Manifest, picture: &Picture) -> Vec<String> {
         findings.push(format!("it has {width} x {height} pixels, but should have {} x {}", image.width, image.height));
         return findings;
     }
+    if film.aovs().iter().map(Aov::name).ne(image.aovs.iter().map(String::as_str)) {
+        let words = film.aovs().iter().map(Aov::name).collect::<Vec<_>>().join(", ");
+        findings.push(format!("beside colours it tells {{{words}}}, but should tell {{{}}}", image.aovs.join(", ")));
+    }
     if hexadecimal(&film.hash()) != image.pixels_hash {
         findings.push("pixels are not those that were rendered".to_owned());
     }
@@ -153,7 +158,12 @@ fn cut(film: &Film, rect: Rect) -> Option<RenderedPart> {
     }
     let rows = film.pixels().chunks_exact(film.width() as usize).skip(rect.y as usize).take(rect.height as usize);
     let pixels = rows.flat_map(|row| &row[rect.x as usize..][..rect.width as usize]).copied().collect();
-    Some(RenderedPart { rect, pixels, counters: Counters::default() })
+    let numbers = film.aovs().numbers();
+    let extra = (rect.y..rect.y + rect.height).flat_map(|y| {
+        let first = y as usize * film.width() as usize + rect.x as usize;
+        &film.extra()[first * numbers..][..rect.width as usize * numbers]
+    });
+    Some(RenderedPart { rect, pixels, extra: extra.copied().collect(), counters: Counters::default() })
 }
 
 fn hexadecimal(hash: &[u8; 32]) -> String {

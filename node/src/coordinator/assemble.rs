@@ -50,9 +50,9 @@ pub enum Refusal {
 /// # Errors
 /// Pixels that cannot be read back, or a disk that refuses.
 pub fn write(assembly: &Assembly, pixels: &Pixels) -> Result<ReportEntry, Refusal> {
-    let size = &assembly.stored.description.frame.film;
+    let frame = &assembly.stored.description.frame;
     let reader = pixels.reader(assembly.job).map_err(|error| Refusal::Files(error.to_string()))?;
-    let mut bands = Bands::new((size.width, size.height), reader, &assembly.parts);
+    let mut bands = Bands::new((frame.film.width, frame.film.height), frame.aovs, reader, &assembly.parts);
     write_files(assembly, &mut bands).map_err(|reason| match bands.unreadable {
         Some((part, reason)) => Refusal::Pixels(part, reason),
         None => Refusal::Files(reason),
@@ -123,6 +123,7 @@ pub fn write_pictures(
         seed: frame.seed,
         image_hash: identity.image_hash,
         pixel_type: noted,
+        aovs: picture.aovs().iter().map(|aov| aov.name().to_owned()).collect(),
         pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
         clamped,
         holes,

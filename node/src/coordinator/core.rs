@@ -425,8 +425,9 @@ impl Core {
             }
             farm::ToNode::Probe { job, cells, stride } => ToNode::Probe { job, cells, stride },
             farm::ToNode::Render { job, lease, rect, samples } => {
-                let frame = self.jobs.get(&job)?.stored.as_ref()?.frame;
-                if self.shared.leases.add(job, lease, Lease { node, incarnation, frame, rect }) {
+                let stored = self.jobs.get(&job)?.stored.as_ref()?;
+                let (frame, aovs) = (stored.frame, stored.description.frame.aovs);
+                if self.shared.leases.add(job, lease, Lease { node, incarnation, frame, rect, aovs }) {
                     self.shared.metrics.attempts.inc();
                 }
                 ToNode::Render { job, lease, rect, samples }

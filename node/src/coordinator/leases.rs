@@ -5,7 +5,10 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-use tessera_engine::{description::AssetId, part::Rect};
+use tessera_engine::{
+    description::{Aovs, AssetId},
+    part::Rect,
+};
 
 use crate::{
     farm::{Incarnation, JobId, LeaseId},
@@ -23,6 +26,8 @@ pub struct Lease {
     pub frame: AssetId,
     /// Its pixels.
     pub rect: Rect,
+    /// What its frame tells beside colours.
+    pub aovs: Aovs,
 }
 
 /// All attempts that were handed out and are not settled.
@@ -71,7 +76,7 @@ mod tests {
     fn a_node_settles_no_attempt_of_another() {
         let leases = Leases::default();
         let rect = Rect { x: 0, y: 0, width: 1, height: 1 };
-        let lease = Lease { node: NodeId(1), incarnation: Incarnation(1), frame: AssetId::of(b"frame"), rect };
+        let lease = Lease { node: NodeId(1), incarnation: Incarnation(1), frame: AssetId::of(b"frame"), rect, aovs: Aovs::NONE };
         leases.add(JobId(1), LeaseId(1), lease);
         leases.remove_of(NodeId(2), JobId(1), LeaseId(1));
         assert_eq!(leases.get(JobId(1), LeaseId(1)), Some(lease));

@@ -195,9 +195,10 @@ async fn bytes_left(shared: &Shared, owner: &str) -> io::Result<u64> {
 async fn may_submit(shared: &Shared, description: &JobDescription, terms: &Terms) -> Result<(), String> {
     submission::check(description, terms)?;
     shared.status.borrow().refusal.clone().map_or(Ok(()), Err)?;
-    let (store, film) = (shared.store.clone(), &description.frame.film);
-    let pixels = u64::from(film.width) * u64::from(film.height);
-    tokio::task::spawn_blocking(move || store.room_for(pixels)).await.map_err(|error| error.to_string())?
+    let (store, frame) = (shared.store.clone(), &description.frame);
+    let pixels = u64::from(frame.film.width) * u64::from(frame.film.height);
+    let bytes = pixels.saturating_mul(frame.aovs.bytes_per_pixel());
+    tokio::task::spawn_blocking(move || store.room_for(bytes)).await.map_err(|error| error.to_string())?
 }
 
 /// All jobs that are kept, those that wait and run among them.

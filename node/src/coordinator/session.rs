@@ -211,7 +211,8 @@ async fn read_part(shared: &Shared, from: &Source, stream: &mut RecvStream) -> R
         let _ = stream.stop(0_u8.into());
         return Ok((header, Some(Vec::new())));
     };
-    let length = usize::try_from(lease.rect.area() * 12).ok().filter(|&length| length <= PART_BYTES).ok_or("a part that is too large")?;
+    let length = lease.rect.area().saturating_mul(lease.aovs.bytes_per_pixel());
+    let length = usize::try_from(length).ok().filter(|&length| length <= PART_BYTES).ok_or("a part that is too large")?;
     let attempt = (header.job, header.lease);
     if !from.arriving.lock().unwrap_or_else(PoisonError::into_inner).insert(attempt) {
         return Err("the same part twice at once".to_owned());

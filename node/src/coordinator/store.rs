@@ -79,10 +79,10 @@ impl Store {
     ///
     /// # Errors
     /// In words, when too little would stay free. A disk that does not say how much is free has room.
-    pub fn room_for(&self, pixels: u64) -> Result<(), String> {
+    pub fn room_for(&self, bytes: u64) -> Result<(), String> {
         let free = self.free().unwrap_or(u64::MAX);
         // Once as parts, once as a picture; a preview and the manifest are small beside them.
-        let needed = pixels.saturating_mul(2 * 12);
+        let needed = bytes.saturating_mul(2);
         if free.saturating_sub(needed) >= self.reserve {
             return Ok(());
         }

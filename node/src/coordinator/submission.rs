@@ -6,8 +6,8 @@ use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
     limits::{
-        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, NODES, PARTS_PER_JOB, PIXELS_PER_FRAME, PRIORITY,
-        SAMPLES_PER_PIXEL,
+        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, NODES, PART_BYTES, PARTS_PER_JOB, PIXELS_PER_FRAME,
+        PRIORITY, SAMPLES_PER_PIXEL,
     },
     schedule::{Probe, Split},
     wire::{self, Terms},
@@ -42,7 +42,7 @@ pub fn check(description: &JobDescription, terms: &Terms) -> Result<(), String> 
         return Err(format!("a patience of {:?} s; 0 to {LONGEST_PATIENCE} is allowed", description.patience));
     }
     probe(&description.probe)?;
-    split(&description.split, film.width, film.height)
+    split(&description.split, film.width, film.height, description.frame.aovs.bytes_per_pixel())
 }
 
 fn check_terms(terms: &Terms) -> Result<(), String> {
@@ -63,17 +63,27 @@ fn probe(probe: &Probe) -> Result<(), String> {
     }
 }
 
-fn split(split: &Split, width: u32, height: u32) -> Result<(), String> {
+fn split(split: &Split, width: u32, height: u32, bytes_per_pixel: u64) -> Result<(), String> {
     let parts = match *split {
         Split::Grid { width: 0, .. } | Split::Grid { height: 0, .. } | Split::Strips { count: 0 } => 0,
         Split::Grid { width: columns, height: rows } => u64::from(width.div_ceil(columns)) * u64::from(height.div_ceil(rows)),
         Split::Strips { count } => u64::from(count.min(height)),
         Split::Script => 1,
     };
-    match parts {
-        1.. if parts <= PARTS_PER_JOB as u64 => Ok(()),
-        _ => Err(format!("a split into {parts} parts; 1 to {PARTS_PER_JOB} are allowed")),
+    if !(1..=PARTS_PER_JOB as u64).contains(&parts) {
+        return Err(format!("a split into {parts} parts; 1 to {PARTS_PER_JOB} are allowed"));
     }
+    let largest = match *split {
+        Split::Grid { width: columns, height: rows } => u64::from(columns.min(width)) * u64::from(rows.min(height)),
+        Split::Strips { count } => u64::from(width) * u64::from(height.div_ceil(count.max(1))),
+        Split::Script => 0,
+    };
+    if largest.saturating_mul(bytes_per_pixel) > PART_BYTES as u64 {
+        return Err(format!(
+            "parts of {largest} pixels of {bytes_per_pixel} bytes; {PART_BYTES} bytes are allowed: split it into smaller parts"
+        ));
+    }
+    Ok(())
 }
 
 fn outputs(output: &Output) -> Result<(), String> {
@@ -138,8 +148,12 @@ mod tests {
             (Split::Grid { width: 8, height: 0 }, "0 parts"),
             (Split::Strips { count: 0 }, "0 parts"),
         ] {
-            assert!(split(&wrong, 32_768, 32_768).is_err_and(|message| message.contains(what)), "{wrong:?}");
+            assert!(split(&wrong, 32_768, 32_768, 12).is_err_and(|message| message.contains(what)), "{wrong:?}");
         }
-        assert!(split(&Split::Grid { width: 64, height: 64 }, 1024, 768).is_ok());
+        assert!(split(&Split::Grid { width: 64, height: 64 }, 1024, 768, 76).is_ok());
+        let whole = Split::Grid { width: 65_536, height: 65_536 };
+        assert!(split(&whole, 4096, 4096, 12).is_ok());
+        assert!(split(&whole, 4096, 4096, 76).is_err_and(|message| message.contains("parts of 16777216 pixels of 76 bytes")));
+        assert!(split(&Split::Strips { count: 1 }, 4096, 4096, 76).is_err());
     }
 }

@@ -24,7 +24,7 @@ const ANY: Camera = Camera::Panoramic { eye: [0.0, 0.0, 1.0], look_at: [0.0; 3],
 /// # Errors
 /// What cannot be compiled, at the object's place in the script.
 pub fn compile(name: &str, scene: Scene, job: &JobNode, assets: &MemoryAssets, sources: &Sources) -> Result<Compiled, Fault> {
-    let JobNode { camera, film, render, quality, seed, .. } = job;
+    let JobNode { camera, film, render, quality, seed, aovs, .. } = job;
     let place = |source: SourceId| sources.get(source).map_or_else(|| name.to_owned(), ToString::to_string);
     let mut frame = Frame {
         scene,
@@ -33,6 +33,7 @@ pub fn compile(name: &str, scene: Scene, job: &JobNode, assets: &MemoryAssets, s
         render: render.clone(),
         quality: quality.clone(),
         seed: *seed,
+        aovs: *aovs,
     };
     let read = |frame: &Frame| {
         scene::Scene::read(frame, assets)

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 use mlua::{Function, Lua, MetaMethod, UserData, UserDataMethods, Value};
 use tessera_engine::description::{
-    Camera, Environment, Film, Light, Material, Matrix, Medium, Model, Quality, Render, Shape, SourceId, Texture,
+    Aovs, Camera, Environment, Film, Light, Material, Matrix, Medium, Model, Quality, Render, Shape, SourceId, Texture,
 };
 
 use super::{Frames, Output, api::transform, keys::describe, place::Place};
@@ -83,6 +83,7 @@ pub struct JobNode {
     pub split: Policy<Split>,
     pub assign: Policy<Assign>,
     pub output: Output,
+    pub aovs: Aovs,
     pub seed: u64,
     pub audit: f64,
     pub attempts: u32,

@@ -205,7 +205,7 @@ impl<'a> Field<'_, 'a> {
 
     /// One of several words.
     pub fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> mlua::Result<T> {
-        let words = || choices.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ");
+        let words = || quoted(choices);
         let Some(text) = self.value.as_string().map(|text| text.to_string_lossy()) else { return Err(self.wrong(words()).into()) };
         let help = || nearest(&text, choices.iter().map(|(word, _)| *word)).map(|near| format!("did you mean \"{near}\"?"));
         choices.iter().find(|(word, _)| *word == text).map(|(_, choice)| *choice).ok_or_else(|| {
@@ -215,6 +215,14 @@ impl<'a> Field<'_, 'a> {
                 None => fault.into(),
             }
         })
+    }
+
+    /// A list of such words.
+    pub fn choices<T: Copy>(&self, choices: &[(&str, T)]) -> mlua::Result<Vec<T>> {
+        match &self.value {
+            Value::Table(table) if !has_keys(table)? => self.list()?.iter().map(|word| word.choice(choices)).collect(),
+            _ => Err(self.wrong(format!("a list of {}", quoted(choices))).into()),
+        }
     }
 
     /// A list of exactly `N` numbers: `{1, 2, 3}` or, for three, a Luau vector.
@@ -318,6 +326,10 @@ impl<'a> Field<'_, 'a> {
             }
         })
     }
+}
+
+fn quoted<T>(choices: &[(&str, T)]) -> String {
+    choices.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ")
 }
 
 /// `sphere "sun"`: with the object's name, or that of its file.

@@ -101,6 +101,7 @@ impl Example {
             seed: 0,
             image_hash: "11".repeat(32),
             pixel_type: PixelType::Float,
+            aovs: Vec::new(),
             pixels_hash: "22".repeat(32),
             clamped: 0,
             holes: Vec::new(),

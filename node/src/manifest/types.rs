@@ -80,7 +80,11 @@ pub struct ImageEntry {
     pub image_hash: String,
     /// How the EXR holds its numbers.
     pub pixel_type: PixelType,
-    /// BLAKE3 of the pixels as they are read from the EXR (float32, little-endian, RGB, row by row), in hexadecimal.
+    /// What the EXR tells beside colours, in the order in which a pixel's numbers are hashed.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aovs: Vec<String>,
+    /// BLAKE3 of the pixels as they are read from the EXR (float32, little-endian, RGB, row by row; behind each row what it tells beside colours, pixel by
+    /// pixel), in hexadecimal.
     pub pixels_hash: String,
     /// Rectangles that nobody could render: `[x, y, width, height]`. They are black in the EXR and magenta in the preview.
     #[serde(default)]
@@ -155,8 +159,8 @@ pub struct PartEntry {
     pub predicted: f64,
     /// Whom the plan gave it to at first.
     pub planned: Option<NodeId>,
-    /// BLAKE3 of its rectangle (four little-endian u32) and its pixels (as in [`ImageEntry::pixels_hash`], but never rounded to half floats), in
-    /// hexadecimal, once it is committed.
+    /// BLAKE3 of its rectangle (four little-endian u32) and its pixels (as in [`ImageEntry::pixels_hash`], but never rounded to half floats, and with all
+    /// that it tells beside colours behind all of these), in hexadecimal, once it is committed.
     pub hash: Option<String>,
     /// Attempts in order of their start.
     pub attempts: Vec<AttemptEntry>,

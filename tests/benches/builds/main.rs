@@ -10,8 +10,8 @@ use std::{fs, time::Instant};
 
 use tessera_engine::{
     description::{
-        Camera, Film, Filter, Frame, Group, Material, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render, Scene as Description,
-        Shape, SourceId,
+        Aovs, Camera, Film, Filter, Frame, Group, Material, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render,
+        Scene as Description, Shape, SourceId,
     },
     scene::{Scene, Statistics},
 };
@@ -102,6 +102,7 @@ fn scene(encoded: Vec<u8>) -> (MemoryAssets, Frame) {
         render: Render::Raycast,
         quality: Quality { samples: 1 },
         seed: 1,
+        aovs: Aovs::NONE,
     };
     (assets, frame)
 }

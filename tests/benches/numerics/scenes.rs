@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use tessera_engine::{
     description::{
-        Camera, Film, Filter, Frame, Group, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render,
+        Aovs, Camera, Film, Filter, Frame, Group, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render,
         Scene as Description, Shape, SourceId,
     },
     scene::{Hit, Scene, Tracer, Work},
@@ -66,6 +66,7 @@ pub fn frame(objects: Vec<Object>) -> Frame {
         render: Render::Raycast,
         quality: Quality { samples: 1 },
         seed: 0,
+        aovs: Aovs::NONE,
     }
 }
 

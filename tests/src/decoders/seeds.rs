@@ -6,8 +6,8 @@ use std::{collections::BTreeMap, fs, time::Duration};
 use serde::Serialize;
 use tessera_engine::{
     description::{
-        AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData, Object,
-        ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+        Aov, Aovs, AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData,
+        Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
     },
     film,
     output::exr,
@@ -55,8 +55,9 @@ pub fn made() -> Vec<Seed> {
     seeds.push(("journal_events", "job".into(), events(&[])));
     seeds.push(("journal_events", "troubles".into(), events(&troubles())));
     for (name, pixel_type) in [("float", exr::PixelType::Float), ("half", exr::PixelType::Half)] {
-        seeds.push(("exr", name.into(), picture(pixel_type)));
+        seeds.push(("exr", name.into(), picture(pixel_type, Aovs::NONE)));
     }
+    seeds.push(("exr", "aovs".into(), picture(exr::PixelType::Half, [Aov::Depth, Aov::Object].into_iter().collect())));
     seeds
 }
 
@@ -111,7 +112,7 @@ fn node_says(seeds: &mut Vec<Seed>) {
         FromNode::Goodbye { reason: "it is late".into() },
     ];
     each(seeds, "wire_control", "node", &said);
-    let part = RenderedPart::from_bytes(Rect { x: 3, y: 144, width: 2, height: 1 }, Counters::default(), &[63; 24]).unwrap();
+    let part = RenderedPart::from_bytes(Rect { x: 3, y: 144, width: 2, height: 1 }, Aovs::NONE, Counters::default(), &[63; 24]).unwrap();
     let (job, lease) = (JobId(part.rect.x.into()), LeaseId(part.rect.y.into()));
     let header = PartHeader { job, lease, frame: AssetId::of(OBJ), seconds: 0.5, hash: part.hash() };
     seeds.push(("wire_part", "two_pixels".into(), [wire::encode(&header, 256).unwrap(), part.to_bytes()].concat()));
@@ -255,6 +256,7 @@ fn frame() -> Frame {
         render: Render::Whitted { max_depth: 4, transparent_shadows: true, min_weight: 0.01 },
         quality: Quality { samples: 4 },
         seed: 1,
+        aovs: [Aov::Depth, Aov::Error].into_iter().collect(),
     }
 }
 
@@ -282,11 +284,12 @@ fn segment() -> Vec<u8> {
     fs::read(path).unwrap()
 }
 
-fn picture(pixel_type: exr::PixelType) -> Vec<u8> {
+fn picture(pixel_type: exr::PixelType, aovs: Aovs) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.exr");
     let pixels = (0..5 * 18).map(|i| [i as f32 * 0.01, 0.5, 2.0]).collect();
-    let film = film::Film::from_pixels(5, 18, pixels).unwrap();
+    let extra = (0..5 * 18 * aovs.numbers()).map(|i| i as f32).collect();
+    let film = film::Film::from_numbers(5, 18, pixels, aovs, extra).unwrap();
     exr::write(&path, &film, pixel_type, &exr::Identity::new(FrameHash([0xab; 32]), 5)).unwrap();
     fs::read(path).unwrap()
 }

@@ -6,7 +6,10 @@ use std::{
 };
 
 use serde::{Serialize, de::DeserializeOwned};
-use tessera_engine::part::{Counters, Rect, RenderedPart};
+use tessera_engine::{
+    description::Aovs,
+    part::{Counters, Rect, RenderedPart},
+};
 use tessera_node::{
     coordinator::submission,
     limits::{HELLO_BYTES, PART_HEADER_BYTES},
@@ -69,7 +72,7 @@ pub fn part(bytes: &[u8]) -> bool {
     let mut stream = bytes;
     let Ok(header) = now(wire::read::<PartHeader>(&mut stream, PART_HEADER_BYTES)) else { return false };
     let rect = Rect { x: header.job.0 as u32, y: header.lease.0 as u32, width: stream.len() as u32 / 12, height: 1 };
-    let Ok(part) = RenderedPart::from_bytes(rect, Counters::default(), stream) else {
+    let Ok(part) = RenderedPart::from_bytes(rect, Aovs::NONE, Counters::default(), stream) else {
         assert_ne!(stream.len() % 12, 0, "pixels are taken if their number is right");
         return false;
     };

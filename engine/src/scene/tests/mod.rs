@@ -12,7 +12,7 @@ mod spawn;
 mod transforms;
 
 use crate::description::{
-    Camera, Film, Filter, Frame, Group, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render,
+    Aovs, Camera, Film, Filter, Frame, Group, Material, Matrix, MemoryAssets, MeshData, Object, ObjectKind, Quality, Render,
     Scene as Description, Shape, SourceId,
 };
 use crate::{scene::Scene, shape::Ray};
@@ -72,6 +72,7 @@ pub fn frame(objects: Vec<Object>) -> Frame {
         render: Render::Raycast,
         quality: Quality { samples: 1 },
         seed: 0,
+        aovs: Aovs::NONE,
     }
 }
 

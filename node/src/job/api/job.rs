@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use mlua::Value;
-use tessera_engine::description::{Film, Filter, Quality};
+use tessera_engine::description::{Aov, Aovs, Film, Filter, Quality};
 
 use super::{
     Form, Function,
@@ -37,7 +37,7 @@ pub const TABLES: &[(&str, &[&str])] = &[("film", FILM), ("quality", QUALITY), (
 
 const FILM: &[&str] = &["width", "height", "filter"];
 const QUALITY: &[&str] = &["samples"];
-const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure"];
+const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure", "aovs"];
 
 const FILTERS: &[(&str, Filter)] = &[
     ("box", Filter::Box),
@@ -75,12 +75,12 @@ fn job(keys: &Keys) -> mlua::Result<Value> {
     let probe = keys.or("probe", Probe::Shared { scale: plan::DEFAULT_SCALE }, |field| probe(&field, &film))?;
     let split = keys.or("split", Policy::BuiltIn(plan::DEFAULT_SPLIT), |field| split(&field, &film))?;
     let assign = keys.or("assign", Policy::BuiltIn(Assign::EarliestFinish), |field| assign(&field))?;
-    let output = output(keys, frames.as_ref())?;
+    let (output, aovs) = output(keys, frames.as_ref())?;
     let seed = keys.or("seed", 0, |field| field.integer(0, 1 << 53))?;
     let audit = keys.or("audit", 0.0, |field| field.number(SHARE))?;
     let attempts = keys.or("attempts", limits::ATTEMPTS_PER_PART, |field| field.integer32(1, limits::MOST_ATTEMPTS_PER_PART))?;
     let patience = keys.or("patience", None, |field| field.number(PATIENCE).map(Some))?;
-    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, seed, audit, attempts, patience, frames };
+    let job = JobNode { scene, camera, film, render, quality, probe, split, assign, output, aovs, seed, audit, attempts, patience, frames };
     keys.make(|_| Thing::Job(Arc::new(job)))
 }
 
@@ -150,13 +150,13 @@ fn assign(field: &Field) -> mlua::Result<Policy<Assign>> {
         .map(Policy::BuiltIn)
 }
 
-/// Plain file names: the client puts them into the folder that the user chose.
-fn output(job: &Keys, frames: Option<&(u32, Frames)>) -> mlua::Result<Output> {
+/// Plain file names: the client puts them into the folder that the user chose; and what the picture tells beside colours.
+fn output(job: &Keys, frames: Option<&(u32, Frames)>) -> mlua::Result<(Output, Aovs)> {
     let name = Context::of(job.lua)?.name.clone();
     let manifest = numbered(&format!("{name}.manifest.json"), ".manifest.json", frames);
     let defaults =
         Output { exr: format!("{name}.exr"), png: Some(format!("{name}.png")), manifest, pixel_type: PixelType::Float, exposure: 0.0 };
-    let Some(field) = job.optional("output")? else { return Ok(defaults.numbered(frames)) };
+    let Some(field) = job.optional("output")? else { return Ok((defaults.numbered(frames), Aovs::NONE)) };
     let keys = field.table(OUTPUT)?;
     let exr = keys.or("exr", defaults.exr, |field| file_name(&field, ".exr"))?;
     let png = keys.or("png", defaults.png, |field| match field.value {
@@ -166,7 +166,9 @@ fn output(job: &Keys, frames: Option<&(u32, Frames)>) -> mlua::Result<Output> {
     let types = [("float", PixelType::Float), ("half", PixelType::Half)];
     let pixel_type = keys.or("pixel_type", PixelType::Float, |field| field.choice(&types))?;
     let exposure = keys.or("exposure", 0.0, |field| field.number(EXPOSURE))?;
-    Ok(Output { exr, png, manifest: defaults.manifest, pixel_type, exposure }.numbered(frames))
+    let words = Aov::ALL.map(|aov| (aov.name(), aov));
+    let aovs = keys.or("aovs", Aovs::NONE, |field| Ok(field.choices(&words)?.into_iter().collect()))?;
+    Ok((Output { exr, png, manifest: defaults.manifest, pixel_type, exposure }.numbered(frames), aovs))
 }
 
 fn file_name(field: &Field, ending: &str) -> mlua::Result<String> {

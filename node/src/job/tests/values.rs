@@ -1,7 +1,7 @@
 //! What keys become in the description.
 
 use tessera_engine::description::{
-    AssetSource, Camera, ColorSpace, Environment, Falloff, Light, Material, MeshData, ObjectKind, Render, Shape, Texture, Wrap,
+    Aov, AssetSource, Camera, ColorSpace, Environment, Falloff, Light, Material, MeshData, ObjectKind, Render, Shape, Texture, Wrap,
 };
 
 use super::{BUDGET, job_with, run, small_job};
@@ -40,13 +40,14 @@ fn a_job_that_says_little_gets_the_defaults() {
 fn built_in_policies_and_outputs_are_taken() {
     let description = load(&small_job(
         "split = tessera.split.grid { width = 8, height = 4 }, assign = tessera.assign.paper, probe = tessera.probe.every_node { scale = 0.5 },
-output = { exr = 'a.exr', png = false, pixel_type = 'half', exposure = 1.5 }, seed = 9, render = tessera.raycast()",
+output = { exr = 'a.exr', png = false, pixel_type = 'half', exposure = 1.5, aovs = { 'error', 'depth', 'error' } }, seed = 9, render = tessera.raycast()",
     ))
     .description;
     assert_eq!(description.split, Split::Grid { width: 8, height: 4 });
     assert_eq!((description.assign, description.probe), (Assign::Paper, Probe::EveryNode { scale: 0.5 }));
     assert_eq!((description.output.exr.as_str(), description.output.png.as_deref()), ("a.exr", None));
     assert_eq!((description.output.pixel_type, description.output.exposure), (PixelType::Half, 1.5));
+    assert_eq!(description.frame.aovs.iter().collect::<Vec<_>>(), [Aov::Depth, Aov::Error]);
     assert_eq!((description.frame.seed, &description.frame.render), (9, &Render::Raycast));
     assert_eq!(load(&small_job("split = tessera.split.strips { count = 5 }")).description.split, Split::Strips { count: 5 });
 }

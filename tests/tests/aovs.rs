@@ -1,0 +1,87 @@
+//! A job that asks for all that the picture can tell beside colours, on a farm of processes; and the same job without.
+
+use std::fs;
+
+use tessera_engine::{
+    description::{Aov, Aovs},
+    output::exr,
+};
+use tessera_tests::farm::{Program, manifest};
+
+const BINARY: &str = env!("CARGO_BIN_EXE_tessera-under-test");
+
+const WORDS: &str = r#"aovs = { "error", "albedo", "normal", "depth", "position", "object", "material", "samples" }"#;
+
+/// A ball on a floor, seen from above with some sky; every part is rendered twice and compared.
+fn job(output: &str) -> String {
+    format!(
+        r#"local tessera = require("tessera")
+local grey = tessera.diffuse {{ reflectance = 0.5 }}
+return tessera.job {{
+  scene = tessera.scene {{
+    objects = {{ tessera.plane {{ material = grey }}, tessera.sphere {{ center = {{100, 1, 0}}, material = tessera.mirror {{}} }} }},
+    background = {{0.25, 0.5, 1}},
+  }},
+  camera = tessera.perspective {{ eye = {{100, 2, -6}}, look_at = {{100, 1.5, 0}}, fov = 60 }},
+  film = {{ width = 48, height = 40, filter = "gaussian" }},
+  render = tessera.path {{}},
+  quality = {{ samples = 5 }},
+  split = tessera.split.grid {{ size = 13 }},
+  audit = 1,
+  output = {{ {output} }},
+}}"#
+    )
+}
+
+fn render(program: &Program, script: &str, more: &[&str], folder: &str) {
+    let finished = program.run(&[&["render", script, "-o", folder], more].concat());
+    assert_eq!(finished.code, Some(0), "{}", finished.errors);
+}
+
+#[test]
+fn a_farm_tells_all_that_one_process_tells_and_colours_stay_what_they_are() {
+    let program = Program::new(BINARY);
+    fs::write(program.path("all.lua"), job(WORDS)).unwrap();
+    fs::write(program.path("half.lua"), job(&format!("pixel_type = 'half', {WORDS}"))).unwrap();
+    fs::write(program.path("plain.lua"), job("")).unwrap();
+    render(&program, "all.lua", &["--nodes", "2", "--lanes", "1"], "farm");
+    render(&program, "all.lua", &["--threads", "1"], "alone");
+    render(&program, "half.lua", &["--threads", "1"], "alone");
+    render(&program, "plain.lua", &["--nodes", "2", "--lanes", "1"], "farm");
+    assert!(fs::read(program.path("farm/all.exr")).unwrap() == fs::read(program.path("alone/all.exr")).unwrap());
+
+    let read = |name: &str| exr::read(&program.path(name)).unwrap().film;
+    let (all, half, plain) = (read("farm/all.exr"), read("alone/half.exr"), read("farm/plain.exr"));
+    assert_eq!((all.aovs(), plain.aovs()), (Aov::ALL.into_iter().collect(), Aovs::NONE));
+    assert!(all.pixels() == plain.pixels(), "colours depend on what is told beside them");
+    assert!(all.pixels() != half.pixels() && all.extra() == half.extra(), "what is told beside colours is never rounded");
+    assert!(fs::read(program.path("farm/all.png")).unwrap() == fs::read(program.path("farm/plain.png")).unwrap());
+
+    let at = |x: usize, y: usize, name: &str| {
+        let number = all.aovs().channels().position(|channel| channel == name).unwrap();
+        f64::from(all.extra()[(y * 48 + x) * all.aovs().numbers() + number])
+    };
+    // The sky; the ball, 5 units away; the floor.
+    assert_eq!(
+        ["depth.Z", "object.ID", "material.ID", "samples.N", "normal.Y"].map(|name| at(24, 0, name)),
+        [f64::from(Aov::FARTHEST), 0.0, 0.0, 5.0, 0.0]
+    );
+    assert_eq!(["object.ID", "material.ID", "albedo.R"].map(|name| at(24, 24, name)), [2.0, 2.0, at(24, 24, "albedo.G")]);
+    assert!((at(24, 24, "depth.Z") - 5.1).abs() < 0.2 && (at(24, 24, "position.X") - 100.0).abs() < 0.2);
+    assert_eq!(["object.ID", "material.ID", "albedo.R", "normal.Y", "position.Y"].map(|name| at(24, 39, name)), [1.0, 1.0, 0.5, 1.0, 0.0]);
+    assert!((0..48 * 40).any(|i| at(i % 48, i / 48, "error.G") > 0.0));
+
+    assert_eq!(manifest(&program.path("farm/all.manifest.json"))["image"]["aovs"].as_array().map(Vec::len), Some(8));
+    assert!(manifest(&program.path("farm/plain.manifest.json"))["image"]["aovs"].is_null());
+    for name in ["farm/all.exr", "farm/plain.exr"] {
+        let verified = program.run(&["verify", name]);
+        assert_eq!(verified.code, Some(0), "{}", verified.errors);
+    }
+    fs::copy(program.path("farm/plain.exr"), program.path("farm/all.exr")).unwrap();
+    let verified = program.run(&["verify", "farm/all.manifest.json"]);
+    assert!(verified.code != Some(0) && verified.errors.contains("should tell {albedo, normal,"), "{}", verified.errors);
+
+    let checked = |script: &str| program.run(&["check", script]).lines.concat();
+    assert!(checked("all.lua").contains("albedo, normal, depth, position, object, material, samples, error"), "{}", checked("all.lua"));
+    assert!(!checked("plain.lua").contains("aovs"), "{}", checked("plain.lua"));
+}
