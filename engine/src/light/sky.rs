@@ -64,7 +64,7 @@ impl SunSky {
     }
 
     /// The sun: radiance of its disc as seen through the atmosphere, the same all over, and the disc's angular radius in *degrees*,
-    /// [`SUN_RADIUS`]. Where the horizon covers a part of it, radiance is less instead. A surface that faces it receives radiance times the
+    /// `SUN_RADIUS`. Where the horizon covers a part of it, radiance is less instead. A surface that faces it receives radiance times the
     /// disc's solid angle.
     pub fn sun(&self) -> (DVec3, f64) {
         let half = sin(0.5 * SUN_RADIUS.to_radians());

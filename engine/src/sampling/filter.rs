@@ -98,7 +98,7 @@ enum Kind {
 
 impl PixelFilter {
     /// Tabulates a filter. One that is no filter (its radius is not positive, its integral is not, a parameter is not finite) becomes
-    /// [`Filter::Point`].
+    /// the filter `Point`.
     pub fn new(filter: Filter) -> Self {
         Self(match filter {
             Filter::Box => Kind::Box,
