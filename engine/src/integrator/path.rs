@@ -208,7 +208,8 @@ impl<const MEDIA: bool> Path<MEDIA> {
         walk.throughput *= weight;
         walk.compression *= eta2;
         if walk.depth >= self.roulette_depth {
-            let survival = (walk.throughput * walk.compression).max_element();
+            // The root: between ending as much as a path has lost, which costs the least time, and never, which adds the least noise.
+            let survival = (walk.throughput * walk.compression).max_element().sqrt();
             if survival < 1.0 {
                 if sampler.one(sets + set::ROULETTE) >= survival {
                     return false;

@@ -37,6 +37,6 @@ fn whitted(keys: &Keys) -> mlua::Result<Value> {
 
 fn path(keys: &Keys) -> mlua::Result<Value> {
     let max_depth = keys.or("max_depth", 16, |field| field.integer32(1, LONGEST))?;
-    let roulette_depth = keys.or("roulette_depth", 5, |field| field.integer32(1, LONGEST))?;
+    let roulette_depth = keys.or("roulette_depth", 3, |field| field.integer32(1, LONGEST))?;
     keys.make(|_| Thing::Render(Render::Path { max_depth, roulette_depth }))
 }
