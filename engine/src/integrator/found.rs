@@ -3,10 +3,10 @@
 
 use glam::DVec3;
 
-use super::rgb;
+use super::{path::MOST_PASSED, rgb};
 use crate::{
     light::{Arriving, Vertex},
-    material::{Emission, Recipe},
+    material::Emission,
     scene::{Inside, Tracer},
     shape::{Ray, Surface},
 };
@@ -109,11 +109,11 @@ fn shown(scene: impl Tracer, emitter: u32, surface: &Surface, direction: DVec3) 
     emission.as_ref().filter(|_| is_it).map_or(DVec3::ZERO, |emission| emitted(scene, surface, emission, direction))
 }
 
-/// The share of light that gets through media and their borders, or what an emitter shows through them.
+/// The share of light that gets through media and borders that do not show, or what an emitter shows through them.
 #[inline(never)]
 fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &Inside) -> DVec3 {
     let (mut ray, mut inside, mut share) = (*ray, *inside, DVec3::ONE);
-    loop {
+    for _ in 0..MOST_PASSED {
         let t_max = if arriving.textured.is_some() { f64::INFINITY } else { ray.t_max };
         let met = scene.closest(&Ray { t_max, ..ray });
         let way = met.as_ref().map_or(ray.t_max, |surface| surface.t);
@@ -121,11 +121,11 @@ fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &In
             share *= medium.transmittance(way);
         }
         let Some(surface) = met else { return share };
-        let passes = matches!(scene.materials[surface.material as usize].recipe, Recipe::Boundary { .. });
-        if !passes || share == DVec3::ZERO {
+        if share == DVec3::ZERO || inside.shows(&scene, &surface) {
             return arriving.textured.map_or(DVec3::ZERO, |emitter| share * shown(scene, emitter, &surface, ray.direction));
         }
         inside.cross(&surface, ray.direction);
         ray = Ray { t_max: ray.t_max - surface.t, ..surface.spawn(ray.direction) };
     }
+    DVec3::ZERO
 }

@@ -35,6 +35,8 @@ mod set {
     pub const TRAVEL: u32 = 7;
     /// Sets of one vertex.
     pub const COUNT: u32 = 8;
+    /// The first of those for ways that begin where a ray has gone through something: beyond the sets of the longest path.
+    pub const PASSED: u32 = 1 << 31;
 }
 
 /// Surfaces without effect that a ray goes through before it is given up: objects that touch everywhere would hold it forever.
@@ -53,6 +55,8 @@ struct Walk {
     last: Option<found::Last>,
     /// What the ray is inside of.
     inside: Inside,
+    /// The set of numbers for what happens on the way to the next surface: one for each way, as several lead through media in turn.
+    travel: u32,
 }
 
 /// What becomes of a path where it meets a surface.
@@ -76,7 +80,8 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
     #[inline(always)]
     fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3 {
         let mut radiance = DVec3::ZERO;
-        let mut walk = Walk { ray: *ray, depth: 1, throughput: DVec3::ONE, compression: 1.0, last: None, inside: scene.around_eye };
+        let travel = Sampler::FIRST_FREE + set::TRAVEL;
+        let mut walk = Walk { ray: *ray, depth: 1, throughput: DVec3::ONE, compression: 1.0, last: None, inside: scene.around_eye, travel };
         let mut passed = 0;
         loop {
             let met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
@@ -102,6 +107,7 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
                     };
                 }
                 (Next::Passes, Some(surface)) if passed < MOST_PASSED => {
+                    walk.travel = set::PASSED + passed;
                     passed += 1;
                     walk.inside.cross(surface, walk.ray.direction);
                     walk.ray = surface.spawn(walk.ray.direction);
@@ -161,7 +167,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         }
         let medium = walk.inside.medium(&scene)?;
         let distance = met.map_or(f64::INFINITY, |surface| surface.t);
-        let u = if medium.scatters() { sampler.pair(sets + set::TRAVEL) } else { DVec2::ZERO };
+        let u = if medium.scatters() { sampler.pair(walk.travel) } else { DVec2::ZERO };
         match medium.travel(distance, u) {
             Travel::Arrives(weight) => {
                 walk.throughput *= weight;
@@ -219,6 +225,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         }
         walk.last = (!specular).then_some(found::Last { vertex, pdf, distance: 0.0 });
         walk.depth += 1;
+        walk.travel = sets + set::COUNT + set::TRAVEL;
         self.counts.secondary += 1;
         walk.throughput != DVec3::ZERO
     }

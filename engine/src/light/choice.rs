@@ -98,11 +98,6 @@ impl LightSampler {
         Self { tree: LightTree::new(&clusters), emitters, local, place_of_emitter, distant, environment }
     }
 
-    /// Whether nothing can be chosen.
-    pub fn is_empty(&self) -> bool {
-        self.tree.is_empty() && self.distant.is_empty()
-    }
-
     /// Whether there are lights without a place.
     pub fn has_distant(&self) -> bool {
         !self.distant.is_empty()

@@ -34,7 +34,7 @@ pub use self::{
     ideal::Ideal,
     medium::{Medium, Travel},
     metallic_roughness::MetallicRoughness,
-    model::{ModelPoint, ModelSurface},
+    model::ModelSurface,
     normal::NormalMap,
     recipe::{Glass, Recipe},
     tables::SharedTables,

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::rgb;
+use super::{metallic_roughness::Parameters, rgb};
 use crate::{
-    assets::{Anisotropy, Clearcoat, ModelMaterial, NormalMap, Sheen, Specular, Transmission, Volume},
+    assets::{Anisotropy, Clearcoat, ModelMaterial, Sheen, Specular, Transmission, Volume},
     math::{ln, sin_cos},
     shape::Surface,
     texture::Texture,
@@ -22,39 +22,6 @@ pub struct ModelSurface {
     turn: DVec2,
 }
 
-/// The numbers at one point, with the names and ranges of glTF.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ModelPoint {
-    /// Base colour, each component in [0, 1], vertex colour included.
-    pub base_color: DVec3,
-    /// In [0, 1].
-    pub metallic: f64,
-    /// Perceptual roughness, in [0, 1].
-    pub roughness: f64,
-    /// Index of refraction of what is no metal, at least 1.
-    pub ior: f64,
-    /// Strength of the reflection of what is no metal, in [0, 1].
-    pub specular: f64,
-    /// Colour of that reflection straight on, from 0 on.
-    pub specular_color: DVec3,
-    /// Share of the surface that is coated, in [0, 1].
-    pub clearcoat: f64,
-    /// Perceptual roughness of the coat, in [0, 1].
-    pub clearcoat_roughness: f64,
-    /// Colour of the sheen, each component in [0, 1].
-    pub sheen_color: DVec3,
-    /// Perceptual roughness of the sheen, in [0, 1].
-    pub sheen_roughness: f64,
-    /// How far reflections are stretched along [`Self::anisotropy_direction`], in [0, 1].
-    pub anisotropy: f64,
-    /// A unit vector in the frame of tangent and bitangent.
-    pub anisotropy_direction: DVec2,
-    /// Share of the light that enters what is no metal and gets through, in [0, 1].
-    pub transmission: f64,
-    /// Whether the surface bounds a volume, and thus refracts; otherwise it is thin.
-    pub volume: bool,
-}
-
 impl ModelSurface {
     /// Of a material whose textures begin at `first_texture` of the scene's.
     pub fn new(material: &ModelMaterial, first_texture: u32) -> Self {
@@ -67,12 +34,6 @@ impl ModelSurface {
         self.material.textures().next().is_some()
     }
 
-    /// Bumps of the coat, where it has its own; the texture is a number of the scene's.
-    pub fn coat_normal(&self) -> Option<NormalMap> {
-        let map = self.material.clearcoat.and_then(|coat| coat.normal);
-        map.map(|map| NormalMap { texture: self.first_texture + map.texture, ..map })
-    }
-
     /// Absorption per unit of length in the world, of what the surface encloses (`KHR_materials_volume`: the light that is left after a distance is
     /// `attenuation_color^(distance / attenuation_distance)`); `None` if it is thin or lets no light in.
     pub fn absorption(&self) -> Option<DVec3> {
@@ -83,9 +44,10 @@ impl ModelSurface {
         Some(DVec3::new(of(r), of(g), of(b)).max(DVec3::ZERO))
     }
 
-    /// The numbers at a point of the surface.
+    /// The numbers at a point of the surface, vertex colour included, and the direction along which reflections are stretched: a unit vector in the frame of tangent and
+    /// bitangent.
     #[inline]
-    pub fn at(&self, textures: &[Texture], surface: &Surface) -> ModelPoint {
+    pub fn at(&self, textures: &[Texture], surface: &Surface) -> (Parameters, DVec2) {
         let look = |texture: Option<usize>| match texture.and_then(|texture| textures.get(self.first_texture + texture)) {
             Some(texture) => texture.at(surface.uvs()),
             None => [1.0; 4],
@@ -100,7 +62,7 @@ impl ModelSurface {
         let [vertex_r, vertex_g, vertex_b, _] = surface.color;
         let [_, rough, metal, _] = look(material.metallic_roughness_texture);
         let Specular { factor, texture, color: tint, color_texture } = material.specular;
-        let mut point = ModelPoint {
+        let mut point = Parameters {
             base_color: color([r, g, b], material.base_color_texture) * rgb([vertex_r, vertex_g, vertex_b]),
             metallic: f64::from(material.metallic) * f64::from(metal),
             roughness: f64::from(material.roughness) * f64::from(rough),
@@ -112,7 +74,6 @@ impl ModelSurface {
             sheen_color: DVec3::ZERO,
             sheen_roughness: 0.0,
             anisotropy: 0.0,
-            anisotropy_direction: DVec2::X,
             transmission: 0.0,
             volume: material.volume.is_some(),
         };
@@ -125,8 +86,8 @@ impl ModelSurface {
         if let Some(Transmission { factor, texture }) = material.transmission {
             point.transmission = scalar(factor, texture, 0);
         }
+        let mut direction = DVec2::X;
         if let Some(Anisotropy { strength, texture, .. }) = material.anisotropy {
-            let mut direction = DVec2::X;
             point.anisotropy = strength.into();
             if texture.is_some() {
                 let [x, y, share, _] = look(texture).map(f64::from);
@@ -134,13 +95,18 @@ impl ModelSurface {
                 point.anisotropy *= share;
             }
             let turn = self.turn;
-            point.anisotropy_direction =
-                DVec2::new(direction.x * turn.x - direction.y * turn.y, direction.x * turn.y + direction.y * turn.x);
+            direction = DVec2::new(direction.x * turn.x - direction.y * turn.y, direction.x * turn.y + direction.y * turn.x);
         }
-        point
+        (point, direction)
     }
 
-    /// What of a file's material is not drawn, though it is read.
+    /// What of a file's material path tracing does not draw, though it is read.
+    pub fn undrawn_by_paths(material: &ModelMaterial) -> impl Iterator<Item = &'static str> {
+        let own_bumps = material.clearcoat.is_some_and(|coat| coat.normal.is_some());
+        own_bumps.then_some("the normal map of its clear coat is not modelled; the coat is as bumpy as the base").into_iter()
+    }
+
+    /// What of it simpler integrators do not draw.
     pub fn undrawn(material: &ModelMaterial) -> impl Iterator<Item = &'static str> {
         let metal = material.metallic > 0.0;
         let thick = |volume: &Volume| volume.attenuation_color != [1.0; 3] && volume.attenuation_distance.is_finite();

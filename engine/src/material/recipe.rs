@@ -9,7 +9,7 @@ use super::{
     conductor::{Conductor, Fresnel},
     diffuse::Diffuse,
     energy::{Albedo, DielectricAlbedo},
-    metallic_roughness::{MetallicRoughness, Parameters, Tables},
+    metallic_roughness::{MetallicRoughness, Tables},
     microfacet::SMOOTH_ALPHA,
     mirror::Mirror,
     plastic::Plastic,
@@ -94,27 +94,12 @@ pub struct ModelRecipe {
 impl ModelRecipe {
     /// The BSDF at a point, with something of this index of refraction outside, and the direction of the tangent along which it is smoother.
     pub fn at(&self, outside: f64, textures: &[Texture], surface: &Surface) -> (MetallicRoughness<'_>, DVec2) {
-        let point = self.surface.at(textures, surface);
-        let parameters = Parameters {
-            base_color: point.base_color,
-            metallic: point.metallic,
-            roughness: point.roughness,
-            ior: if self.ior.is_some() { point.ior / outside } else { point.ior },
-            specular: point.specular,
-            specular_color: point.specular_color,
-            clearcoat: point.clearcoat,
-            clearcoat_roughness: point.clearcoat_roughness,
-            sheen_color: point.sheen_color,
-            sheen_roughness: point.sheen_roughness,
-            anisotropy: point.anisotropy,
-            transmission: point.transmission,
-            volume: point.volume,
-        };
+        let (mut parameters, direction) = self.surface.at(textures, surface);
+        if self.ior.is_some() {
+            parameters.ior /= outside;
+        }
         let glass = self.glass.as_deref().filter(|_| outside == 1.0);
-        (
-            MetallicRoughness::new(&parameters, Tables { facets: &self.facets, sheen: self.sheen.as_deref(), glass }),
-            point.anisotropy_direction,
-        )
+        (MetallicRoughness::new(&parameters, Tables { facets: &self.facets, sheen: self.sheen.as_deref(), glass }), direction)
     }
 
     /// Index of refraction of the inside, if there is one.

@@ -68,6 +68,14 @@ impl Inside {
         }
     }
 
+    /// Whether a surface can be seen from here: a border between media cannot, nor can what something of higher priority fills.
+    pub fn shows(&self, scene: &Scene, surface: &Surface) -> bool {
+        match &scene.materials[surface.material as usize].recipe {
+            Recipe::Boundary { .. } => false,
+            recipe => !recipe.has_inside() || self.outside_of(scene, surface).is_some(),
+        }
+    }
+
     fn is_boundary(&self, scene: &Scene, entry: &Entry) -> bool {
         matches!(scene.materials[entry.material as usize].recipe, Recipe::Boundary { .. })
     }

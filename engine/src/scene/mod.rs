@@ -87,9 +87,11 @@ impl Scene {
         -self.geometry.origin
     }
 
-    /// Whether something fills space anywhere, or has a border that cannot be seen.
+    /// Whether something fills space anywhere, or has a border that may not be seen.
     pub fn has_media(&self) -> bool {
-        let fills = |material: &Material| material.recipe.interior().is_some() || matches!(material.recipe, Recipe::Boundary { .. });
+        let fills = |Material { recipe, .. }: &Material| {
+            recipe.interior().is_some() || recipe.priority() > 0 || matches!(recipe, Recipe::Boundary { .. })
+        };
         self.medium.is_some() || self.materials.iter().any(fills)
     }
 

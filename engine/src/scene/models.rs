@@ -57,7 +57,7 @@ impl<'a> Placer<'a> {
             self.materials.push(Material::from_model(material, &loaded.textures, first_texture, self.tables.as_mut()));
         }
         self.textures.extend(loaded.textures);
-        let undrawn = if self.tables.is_some() { Vec::new() } else { undrawn(&loaded.materials, &loaded.meshes) };
+        let undrawn = undrawn(&loaded.materials, &loaded.meshes, self.tables.is_some());
         for message in loaded.warnings.into_iter().chain(undrawn) {
             self.warn(source, message);
         }
@@ -94,12 +94,17 @@ fn placed_light(light: &ModelLight, to_world: &DAffine3, source: SourceId) -> de
 }
 
 /// What is read of the materials that meshes have, but not drawn.
-fn undrawn(materials: &[ModelMaterial], meshes: &[assets::Mesh]) -> Vec<String> {
+fn undrawn(materials: &[ModelMaterial], meshes: &[assets::Mesh], by_paths: bool) -> Vec<String> {
     let mut used = vec![false; materials.len()];
     meshes.iter().for_each(|mesh| used[mesh.material] = true);
     let mut warnings = assets::Warnings::default();
     for (material, _) in materials.iter().zip(used).filter(|(_, used)| *used) {
-        ModelSurface::undrawn(material).for_each(|text| warnings.object("material", format!("{:?}", material.name), text));
+        let mut warn = |text: &str| warnings.object("material", format!("{:?}", material.name), text);
+        if by_paths {
+            ModelSurface::undrawn_by_paths(material).for_each(&mut warn);
+        } else {
+            ModelSurface::undrawn(material).for_each(&mut warn);
+        }
     }
     warnings.into_texts()
 }

@@ -85,6 +85,34 @@ fn shadow_rays_go_through_borders() {
     assert_alike("a lamp behind smoke", seen([1.0; 3]), seen([1.0 + 1e-9, 1.0, 1.0]));
 }
 
+/// Light gets through one after the other with chances of their own: `exp(-s (a + b))` of it, though each is left to chance.
+#[test]
+fn clouds_one_behind_the_other_are_independent() {
+    let cloud = |z: f64| (Shape::Box { min: [-1.0, -1.0, z], max: [1.0, 1.0, z + 1.0] }, boundary(medium([0.0; 3], [0.6; 3], 0.0)));
+    let mut stage = Stage::new().within(SKY);
+    for z in [-1.5, 0.0, 1.5] {
+        let (shape, material) = cloud(z);
+        stage = stage.with(shape, material);
+    }
+    // Chains of one ray: what is scattered is left out.
+    let seen = stage.seen(EYE, [0.0; 3], path(1), 4096);
+    assert_is("three clouds", seen, sky([(-1.8_f64).exp(); 3]));
+}
+
+/// A lamp within glass, behind a ball of lower priority that cannot be seen: rays to the lamp are not stopped by it.
+#[test]
+fn what_cannot_be_seen_casts_no_shadow() {
+    let stage = || {
+        Stage::new()
+            .with(Shape::Box { min: [-9.0, -9.0, -9.0], max: [9.0, 9.0, 9.0] }, filled(1.5, None, 1))
+            .with(rectangle([-1.0, -1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]), diffuse([0.5; 3]))
+            .with(sphere([0.0, 0.0, 4.0], 0.5), lamp([8.0, 4.0, 2.0]))
+    };
+    let hidden = stage().with(sphere([0.0, 0.0, 2.0], 0.7), filled(1.2, None, 0));
+    let (eye, target) = ([2.0, 0.5, 1.0], [0.1, 0.2, 0.0]);
+    assert_alike("a hidden ball", hidden.seen(eye, target, path(2), 256), stage().seen(eye, target, path(2), 256));
+}
+
 /// What scatters and absorbs nothing is not seen in an even sky, however it scatters.
 #[test]
 fn white_smoke_is_not_seen_in_an_even_sky() {

@@ -131,12 +131,12 @@ fn textures_multiply_the_numbers_of_a_material() {
     let scene = scene_of(square(material, &pixels, change), DAffine3::IDENTITY);
     let surface = at(&scene, 0.25, 0.4);
     let model = scene.materials[surface.material as usize].model.as_ref().unwrap();
-    let point = model.at(&scene.textures, &surface);
+    let (point, direction) = model.at(&scene.textures, &surface);
     assert_eq!(point.base_color, DVec3::new(0.0, 0.5, 0.0));
     assert_eq!((point.metallic, point.roughness, point.transmission, point.volume), (0.5, 0.0, 0.5, true));
     assert!((point.specular - 0.1).abs() < 1e-7 && point.ior == 1e4, "{point:?}");
     // (1, -1) turned by a quarter is (1, 1).
-    assert!(point.anisotropy == 0.5 && point.anisotropy_direction.distance(DVec2::ONE.normalize()) < 1e-7, "{point:?}");
+    assert!(point.anisotropy == 0.5 && direction.distance(DVec2::ONE.normalize()) < 1e-7, "{point:?}");
     // A quarter is left after two units: ln 4 / 2.
     assert!(model.absorption().unwrap().distance(DVec3::X * crate::math::ln(2.0)) < 1e-12);
 }
