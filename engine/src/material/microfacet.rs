@@ -59,13 +59,6 @@ impl Ggx {
         2.0 * cos / (cos + self.stretch(w))
     }
 
-    /// Height-correlated masking and shadowing of two directions over the product of their cosines: `G / (cos_o cos_i)`, finite unless both graze
-    /// (pbrt-v4 9.23).
-    #[inline(always)]
-    pub fn shadowing_over_cosines(&self, o: DVec3, i: DVec3) -> f64 {
-        2.0 / (o.z.abs() * self.stretch(i) + i.z.abs() * self.stretch(o))
-    }
-
     /// What a sample by visible normals weighs but for Fresnel's factor: `G(o, i) / G1(o)`, in [0, 1]; `o` or `i` must not graze.
     #[inline(always)]
     pub fn sample_weight(&self, o: DVec3, i: DVec3) -> f64 {

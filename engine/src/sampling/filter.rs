@@ -134,7 +134,8 @@ impl PixelFilter {
     }
 
     /// The largest offset along an axis.
-    pub fn radius(&self) -> f64 {
+    #[cfg(test)]
+    fn radius(&self) -> f64 {
         match &self.0 {
             Kind::Box => 0.5,
             Kind::Point => 0.0,
