@@ -1,9 +1,11 @@
 //! Integrators: how much light comes along a ray.
 
+mod chain;
 mod direct;
 mod first;
 mod found;
 mod path;
+mod photons;
 mod raycast;
 mod shading;
 mod whitted;
@@ -12,6 +14,7 @@ use glam::DVec3;
 
 pub use first::{First, first};
 pub use path::Path;
+pub use photons::{caustics, prepare};
 pub use raycast::Raycast;
 pub use whitted::Whitted;
 

@@ -2,9 +2,9 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Integrator, RayCounts, found, shading::Shading};
+use super::{Integrator, RayCounts, chain::Chain, found, shading::Shading};
 use crate::{
-    light::{Arriving, Vertex},
+    light::{Arriving, Caustics, Vertex},
     material::{Bsdf, Material, Medium, MetallicRoughness, Recipe, Scattered, Travel},
     sampling::Sampler,
     scene::{Inside, Scene, Tracer},
@@ -17,14 +17,16 @@ use crate::{
 ///
 /// `MEDIA` says whether something fills space anywhere, or has a border that cannot be seen.
 #[derive(Debug)]
-pub struct Path<const MEDIA: bool> {
-    max_depth: u32,
+pub struct Path<'s, const MEDIA: bool> {
+    pub(super) max_depth: u32,
     roulette_depth: u32,
-    counts: RayCounts,
+    /// Where light is gathered, if anywhere.
+    pub(super) caustics: Option<&'s Caustics>,
+    pub(super) counts: RayCounts,
 }
 
 /// What a sample's numbers are for, at every vertex; sets before these belong to film and lens.
-mod set {
+pub(super) mod set {
     pub const LIGHT: u32 = 0;
     pub const PLACE: u32 = 1;
     pub const DISTANT: u32 = 2;
@@ -35,6 +37,8 @@ mod set {
     pub const TRAVEL: u32 = 7;
     /// Sets of one vertex.
     pub const COUNT: u32 = 8;
+    /// The direction in which gathered light is looked for, of the set of a path one ray longer.
+    pub const GATHERED: u32 = 1 << 30;
     /// The first of those for ways that begin where a ray has gone through something: beyond the sets of the longest path.
     pub const PASSED: u32 = 1 << 31;
 }
@@ -43,20 +47,30 @@ mod set {
 pub(super) const MOST_PASSED: u32 = 10_000;
 
 /// A path as far as it is known.
-struct Walk {
-    ray: Ray,
+pub(super) struct Walk {
+    pub(super) ray: Ray,
     /// Rays so far.
-    depth: u32,
+    pub(super) depth: u32,
     /// What the radiance along the ray is multiplied by in the pixel.
-    throughput: DVec3,
+    pub(super) throughput: DVec3,
     /// Radiance is compressed where light is slow, but what ends by chance must not depend on it.
-    compression: f64,
+    pub(super) compression: f64,
     /// Where the ray was sent from, and with which density.
-    last: Option<found::Last>,
+    pub(super) last: Option<found::Last>,
+    /// Where the last ray was sent from whose direction was not the only one: since then there were mirrors and lenses alone.
+    pub(super) chain: Option<Chain>,
     /// What the ray is inside of.
-    inside: Inside,
+    pub(super) inside: Inside,
     /// The set of numbers for what happens on the way to the next surface: one for each way, as several lead through media in turn.
-    travel: u32,
+    pub(super) travel: u32,
+}
+
+impl Walk {
+    /// Whether the ray's direction was the only one.
+    #[inline(always)]
+    pub(super) fn is_after_mirror(&self) -> bool {
+        self.last.is_none()
+    }
 }
 
 /// What becomes of a path where it meets a surface.
@@ -69,19 +83,28 @@ enum Next {
     Ends,
 }
 
-impl<const MEDIA: bool> Path<MEDIA> {
-    /// With the settings of [`crate::description::Render::Path`].
-    pub fn new(max_depth: u32, roulette_depth: u32) -> Self {
-        Self { max_depth, roulette_depth, counts: RayCounts::default() }
+impl<'s, const MEDIA: bool> Path<'s, MEDIA> {
+    /// With the settings of [`crate::description::Render::Path`], and what is known of where light is gathered.
+    pub fn new(max_depth: u32, roulette_depth: u32, caustics: Option<&'s Caustics>) -> Self {
+        Self { max_depth, roulette_depth, caustics, counts: RayCounts::default() }
     }
 }
 
-impl<const MEDIA: bool> Integrator for Path<MEDIA> {
+impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
     #[inline(always)]
     fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3 {
         let mut radiance = DVec3::ZERO;
         let travel = Sampler::FIRST_FREE + set::TRAVEL;
-        let mut walk = Walk { ray: *ray, depth: 1, throughput: DVec3::ONE, compression: 1.0, last: None, inside: scene.around_eye, travel };
+        let mut walk = Walk {
+            ray: *ray,
+            depth: 1,
+            throughput: DVec3::ONE,
+            compression: 1.0,
+            last: None,
+            chain: None,
+            inside: scene.around_eye,
+            travel,
+        };
         let mut passed = 0;
         loop {
             let met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
@@ -90,7 +113,7 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
                 Some(next) => next,
                 None => match &met {
                     None => {
-                        radiance += walk.throughput * found::leaving(scene, walk.ray.direction, walk.last.as_ref());
+                        radiance += walk.throughput * found::leaving(scene, walk.ray.direction, walk.last.as_ref()) * self.share(&walk);
                         Next::Ends
                     }
                     Some(surface) => self.meet(scene, surface, &mut walk, sampler, sets, &mut radiance),
@@ -98,6 +121,9 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
             };
             match (next, &met) {
                 (Next::Along(scattered, direction, vertex), _) => {
+                    if self.caustics.is_some() && !scattered.specular {
+                        walk.chain = vertex.normal.map(|_| Chain { point: vertex.point, direction, pdf: scattered.pdf });
+                    }
                     if !self.goes_on(&mut walk, &scattered, vertex, sampler, sets) {
                         return radiance;
                     }
@@ -123,14 +149,14 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
     }
 }
 
-impl<const MEDIA: bool> Path<MEDIA> {
+impl<const MEDIA: bool> Path<'_, MEDIA> {
     /// Adds what a surface shows by itself and what it scatters once, and chooses where the path goes on.
     #[inline(always)]
     fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sampler: &Sampler, sets: u32, radiance: &mut DVec3) -> Next {
         let material = &scene.materials[surface.material as usize];
         let direction = walk.ray.direction;
         if let Some(emission) = &material.emission {
-            *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref());
+            *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref()) * self.share(walk);
         }
         let mut room = None;
         let Some((bsdf, turn)) = bsdf(&scene, material, surface, &walk.inside, &mut room) else { return Next::Passes };
@@ -142,6 +168,9 @@ impl<const MEDIA: bool> Path<MEDIA> {
         if !shading.bsdf.is_specular() {
             let evaluate = |direction| shading.evaluate(direction);
             *radiance += walk.throughput * self.direct(scene, Some(surface), walk, &vertex, sampler, sets, evaluate);
+            if let Some(caustics) = self.caustics {
+                *radiance += walk.throughput * self.gathered(scene, caustics, surface, &shading, walk, sampler, sets);
+            }
         }
         let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
         let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
@@ -315,6 +344,6 @@ pub(super) fn bsdf<'s: 'r, 'r>(
 }
 
 /// Whether light that a ray along `to` brings to what a ray along `from` has met comes from inside of it, or leaves it.
-fn goes_through(scene: impl Tracer, surface: &Surface, from: DVec3, to: DVec3) -> bool {
+pub(super) fn goes_through(scene: impl Tracer, surface: &Surface, from: DVec3, to: DVec3) -> bool {
     scene.materials[surface.material as usize].recipe.has_inside() && (from.dot(surface.ng) < 0.0) == (to.dot(surface.ng) < 0.0)
 }

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 
 use crate::{
     math::{UNIT, max_abs, orthonormal_basis},
-    sampling::{concentric_disc, uniform_cone, uniform_cone_pdf, uniform_triangle},
+    sampling::{concentric_disc, uniform_cone, uniform_cone_pdf, uniform_sphere, uniform_triangle},
     shape::{Bounds, Disc, Sphere},
 };
 
@@ -107,21 +107,33 @@ impl Emitter {
         }
     }
 
+    /// A point on it, chosen evenly by area, and the unit normal there.
+    #[inline]
+    pub fn point(&self, u: DVec2) -> (DVec3, DVec3) {
+        match &self.area {
+            Area::Sphere(sphere) => {
+                let normal = uniform_sphere(u);
+                (sphere.center + normal * sphere.radius, normal)
+            }
+            Area::Disc(disc) => {
+                let at = concentric_disc(u) * disc.radius;
+                let (x, y) = orthonormal_basis(disc.normal);
+                (disc.center + x * at.x + y * at.y, self.normal)
+            }
+            Area::Parallelogram { corner, edges } => (*corner + edges[0] * u.x + edges[1] * u.y, self.normal),
+            Area::Triangle { corner, edges } => {
+                let [_, b1, b2] = uniform_triangle(u);
+                (*corner + edges[0] * b1 + edges[1] * b2, self.normal)
+            }
+        }
+    }
+
     /// A point on it that `from` may see, chosen by two numbers in [0, 1); `None` if it does not shine there.
     #[inline]
     pub fn sample(&self, from: DVec3, u: DVec2) -> Option<EmitterSample> {
         match &self.area {
             Area::Sphere(sphere) => sample_sphere(sphere, from, u),
-            Area::Disc(disc) => {
-                let at = concentric_disc(u) * disc.radius;
-                let (x, y) = orthonormal_basis(disc.normal);
-                self.towards(disc.center + x * at.x + y * at.y, from)
-            }
-            Area::Parallelogram { corner, edges } => self.towards(*corner + edges[0] * u.x + edges[1] * u.y, from),
-            Area::Triangle { corner, edges } => {
-                let [_, b1, b2] = uniform_triangle(u);
-                self.towards(*corner + edges[0] * b1 + edges[1] * b2, from)
-            }
+            _ => self.towards(self.point(u).0, from),
         }
     }
 

@@ -175,6 +175,14 @@ impl LightSampler {
         if self.environment > 0.0 { self.environment * environment.pdf(direction) } else { 0.0 }
     }
 
+    /// All distant lights of some extent: the direction to the middle of each, its radiance, and the squared sine of half the angle under which it is seen.
+    pub fn suns(&self) -> impl Iterator<Item = (DVec3, DVec3, f64)> {
+        self.distant.iter().filter_map(|(light, _)| match *light {
+            Distant::Disc(towards, radiance, sin2) => Some((towards, radiance, sin2)),
+            _ => None,
+        })
+    }
+
     /// Distant lights of some extent that are seen in a direction: radiance and density of each.
     #[inline]
     pub fn discs(&self, direction: DVec3) -> impl Iterator<Item = (DVec3, f64)> {

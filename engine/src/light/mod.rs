@@ -1,6 +1,7 @@
 //! Lights, compiled: each kind in a file of its own, and which of many to look at.
 
 mod area;
+mod caustics;
 mod choice;
 mod delta;
 mod environment;
@@ -11,6 +12,7 @@ use glam::DVec3;
 
 pub use self::{
     area::{Area, Emitter, EmitterSample},
+    caustics::{Ball, Begin, Caustics, Departing, Photon, Sources},
     choice::{Arriving, LightSampler, Vertex},
     delta::{Light, LightSample},
     environment::{Environment, ImageEnvironment, turned},

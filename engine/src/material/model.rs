@@ -34,6 +34,13 @@ impl ModelSurface {
         self.material.textures().next().is_some()
     }
 
+    /// Whether light may go on in single directions from all of it: it is nowhere rough, and either metal or clear.
+    pub fn may_gather(&self) -> bool {
+        let material = &self.material;
+        let clear = material.transmission.is_some_and(|transmission| transmission.factor == 1.0);
+        material.roughness == 0.0 && (material.metallic == 1.0 || clear)
+    }
+
     /// Absorption per unit of length in the world, of what the surface encloses (`KHR_materials_volume`: the light that is left after a distance is
     /// `attenuation_color^(distance / attenuation_distance)`); `None` if it is thin or lets no light in.
     pub fn absorption(&self) -> Option<DVec3> {

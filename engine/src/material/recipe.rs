@@ -218,6 +218,17 @@ impl Recipe {
         }
     }
 
+    /// Whether light that falls on the surface may be gathered elsewhere: most of it goes on in single directions.
+    pub fn gathers(&self) -> bool {
+        match self {
+            Self::Mirror(_) => true,
+            Self::Metal { alpha, .. } => alpha.iter().all(|alpha| *alpha < SMOOTH_ALPHA),
+            Self::Glass(glass) => glass.alpha < SMOOTH_ALPHA,
+            Self::Model(model) => model.surface.may_gather(),
+            Self::Nothing | Self::Boundary { .. } | Self::Diffuse { .. } | Self::RoughDiffuse { .. } | Self::Plastic { .. } => false,
+        }
+    }
+
     /// What is behind the surface, if that is not empty.
     #[inline]
     pub fn interior(&self) -> Option<&Medium> {

@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange, aovs, spread::Spread};
 use crate::{
     description::{Aov, Render},
-    integrator::{Integrator, Path, Raycast, Whitted},
+    integrator::{Integrator, Path, Raycast, Whitted, caustics},
     sampling::Sampler,
     scene::{Scene, Tracer, Work},
     shape::Ray,
@@ -77,10 +77,11 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
             scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
         Render::Path { max_depth, roulette_depth } => {
+            let caustics = caustics(scene);
             if scene.has_media() {
-                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth), lattice, samples, cancel))
+                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth, caustics), lattice, samples, cancel))
             } else {
-                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth), lattice, samples, cancel))
+                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth, caustics), lattice, samples, cancel))
             }
         }
     }

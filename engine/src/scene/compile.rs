@@ -6,6 +6,8 @@ use super::{
     error::{CompileError, Warning},
     place::{FARTHEST, Placer},
 };
+use std::sync::OnceLock;
+
 use glam::{DMat3, DVec3};
 
 use crate::{
@@ -93,6 +95,7 @@ impl Scene {
             seed: frame.seed,
             aovs: frame.aovs,
             statistics: Statistics::default(),
+            caustics: OnceLock::new(),
             materials: placed.materials,
             textures: placed.textures,
             warnings: placed.warnings,

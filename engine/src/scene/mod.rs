@@ -1,5 +1,6 @@
 //! The compiled scene: all that a frame's rays need, immutable and shared by all threads.
 
+mod casters;
 mod compile;
 mod emitters;
 mod error;
@@ -30,12 +31,14 @@ pub use surface::Crossing;
 pub use tracer::{Tracer, Work};
 pub use unbuilt::Unbuilt;
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 
 use crate::{
     camera::Camera,
     description::{Aovs, Film, Quality, Render},
-    light::{Environment, Light, LightSampler},
+    light::{Caustics, Environment, Light, LightSampler, Sources},
     material::{Material, Medium, Recipe},
     sampling::PixelFilter,
     shape::Bounds,
@@ -76,6 +79,8 @@ pub struct Scene {
     pub aovs: Aovs,
     /// What a user should know, each once.
     pub warnings: Vec<Warning>,
+    /// Where mirrors and lenses gather light: found by photons when it is first asked for.
+    pub caustics: OnceLock<Caustics>,
     /// What the scene is made of.
     pub statistics: Statistics,
     geometry: Geometry,
@@ -93,6 +98,12 @@ impl Scene {
             recipe.interior().is_some() || recipe.priority() > 0 || matches!(recipe, Recipe::Boundary { .. })
         };
         self.medium.is_some() || self.materials.iter().any(fills)
+    }
+
+    /// Lights whose light something in the scene may gather, and these things; `None` if there are none.
+    pub fn gathered(&self) -> Option<Sources<'_>> {
+        let casters = casters::casters(&self.geometry, &self.materials);
+        Sources::new(&self.light_sampler, &self.environment, casters, self.geometry.bounds?)
     }
 
     /// Lowest and highest coordinates, in the world, of all finite things.

@@ -1,0 +1,125 @@
+//! Light that mirrors and lenses gather on a surface: rays are sent there from where photons have come.
+
+use glam::DVec3;
+
+use super::{
+    found,
+    path::{self, MOST_PASSED, Path, Walk, set},
+    shading::Shading,
+};
+use crate::{
+    light::Caustics,
+    material::{Recipe, Travel},
+    sampling::Sampler,
+    scene::Tracer,
+    shape::Surface,
+};
+
+/// The share of points that send a ray to where gathered light may come from: more cost more time than they take away noise.
+const SENT: f64 = 0.5;
+
+/// A ray whose direction was one of many.
+#[derive(Clone, Copy, Debug)]
+pub struct Chain {
+    /// Where it was sent from.
+    pub point: DVec3,
+    /// Unit vector.
+    pub direction: DVec3,
+    /// The density by solid angle with which it was chosen.
+    pub pdf: f64,
+}
+
+impl<const MEDIA: bool> Path<'_, MEDIA> {
+    /// How much counts of what a path finds: all, unless it comes over mirrors and lenses alone from a point at which they are looked for (by the balance heuristic).
+    #[inline(always)]
+    pub(super) fn share(&self, walk: &Walk) -> f64 {
+        match (self.caustics, walk.chain) {
+            (Some(caustics), Some(chain)) if walk.is_after_mirror() => share(caustics, chain),
+            _ => 1.0,
+        }
+    }
+
+    /// Light that a surface scatters once after mirrors and lenses have gathered it.
+    #[inline(never)]
+    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
+    pub(super) fn gathered(
+        &mut self,
+        scene: impl Tracer,
+        caustics: &Caustics,
+        surface: &Surface,
+        shading: &Shading,
+        walk: &Walk,
+        sampler: &Sampler,
+        sets: u32,
+    ) -> DVec3 {
+        let sets = set::GATHERED + sets;
+        if sampler.one(sets + set::LIGHT) >= SENT {
+            return DVec3::ZERO;
+        }
+        let proposed = caustics.sample(surface.point, sampler.one(sets + set::PLACE), sampler.pair(sets + set::PLACE));
+        let Some((direction, density)) = proposed else { return DVec3::ZERO };
+        let (f, pdf) = shading.evaluate(direction);
+        if f == DVec3::ZERO {
+            return DVec3::ZERO;
+        }
+        let mut inside = walk.inside;
+        if MEDIA && path::goes_through(scene, surface, walk.ray.direction, direction) {
+            inside.cross(surface, direction);
+        }
+        let throughput = f / (SENT * density + pdf);
+        let begun = Walk { ray: surface.spawn(direction), depth: walk.depth + 1, throughput, inside, ..*walk };
+        self.follow(scene, begun, sampler)
+    }
+
+    /// What a ray finds over mirrors and lenses alone, at least one.
+    #[inline(always)]
+    fn follow(&mut self, scene: impl Tracer, mut walk: Walk, sampler: &Sampler) -> DVec3 {
+        let (mut found, mut gathered) = (DVec3::ZERO, false);
+        for passed in 0..MOST_PASSED {
+            self.counts.secondary += 1;
+            let met = scene.closest(&walk.ray);
+            if MEDIA && let Some(medium) = walk.inside.medium(&scene) {
+                let distance = met.as_ref().map_or(f64::INFINITY, |surface| surface.t);
+                let Travel::Arrives(weight) = medium.travel(distance, sampler.pair(set::GATHERED + set::PASSED + passed)) else { break };
+                walk.throughput *= weight;
+            }
+            let Some(surface) = met else {
+                return if gathered { found + walk.throughput * found::leaving(scene, walk.ray.direction, None) } else { found };
+            };
+            let material = &scene.materials[surface.material as usize];
+            if gathered && let Some(emission) = &material.emission {
+                found += walk.throughput * found::shining(scene, &surface, emission, walk.ray.direction, None);
+            }
+            let mut room = None;
+            let Some((bsdf, turn)) = path::bsdf(&scene, material, &surface, &walk.inside, &mut room) else {
+                walk.inside.cross(&surface, walk.ray.direction);
+                walk.ray = surface.spawn(walk.ray.direction);
+                continue;
+            };
+            if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
+                break;
+            }
+            let shading = Shading::new(bsdf, turn, &scene, material, &surface, walk.ray.direction);
+            let sets = set::GATHERED + Sampler::FIRST_FREE + walk.depth * set::COUNT;
+            let Some((scattered, direction)) = shading.sample(sampler.one(sets + set::LOBE), sampler.pair(sets + set::SCATTER)) else {
+                break;
+            };
+            if !scattered.specular {
+                break;
+            }
+            if scattered.transmitted && material.recipe.has_inside() {
+                walk.inside.cross(&surface, direction);
+            }
+            walk.throughput *= scattered.weight;
+            walk.depth += 1;
+            walk.ray = surface.spawn(direction);
+            gathered = true;
+        }
+        found
+    }
+}
+
+#[inline(never)]
+fn share(caustics: &Caustics, chain: Chain) -> f64 {
+    chain.pdf / (chain.pdf + SENT * caustics.pdf(chain.point, chain.direction))
+}
