@@ -20,6 +20,7 @@ use crate::{
 pub struct Path<const MEDIA: bool> {
     max_depth: u32,
     roulette_depth: u32,
+    smooth_terminator: bool,
     counts: RayCounts,
 }
 
@@ -42,6 +43,9 @@ mod set {
 /// Surfaces without effect that a ray goes through before it is given up: objects that touch everywhere would hold it forever.
 pub(super) const MOST_PASSED: u32 = 10_000;
 
+/// Chains end by chance with no smaller chance to go on: one far below 2^-53 could not be told from none, and what went on would be far too bright.
+const LEAST_SURVIVAL: f64 = 1.0 / 256.0;
+
 /// A path as far as it is known.
 struct Walk {
     ray: Ray,
@@ -55,8 +59,31 @@ struct Walk {
     last: Option<found::Last>,
     /// What the ray is inside of.
     inside: Inside,
+    /// Where several objects have a face where it meets one: what it is inside of at the one that shows, and behind all.
+    joint: Option<[Inside; 2]>,
     /// The set of numbers for what happens on the way to the next surface: one for each way, as several lead through media in turn.
     travel: u32,
+}
+
+impl Walk {
+    /// What the ray is inside of where it meets a surface.
+    #[inline(always)]
+    fn before<const MEDIA: bool>(&self) -> &Inside {
+        self.joint.as_ref().filter(|_| MEDIA).map_or(&self.inside, |[before, _]| before)
+    }
+
+    /// The same behind it.
+    #[inline(always)]
+    fn beyond<const MEDIA: bool>(&self, surface: &Surface, direction: DVec3) -> Inside {
+        match &self.joint {
+            Some([_, beyond]) if MEDIA => *beyond,
+            _ => {
+                let mut beyond = self.inside;
+                beyond.cross(surface, direction);
+                beyond
+            }
+        }
+    }
 }
 
 /// What becomes of a path where it meets a surface.
@@ -71,8 +98,8 @@ enum Next {
 
 impl<const MEDIA: bool> Path<MEDIA> {
     /// With the settings of [`crate::description::Render::Path`].
-    pub fn new(max_depth: u32, roulette_depth: u32) -> Self {
-        Self { max_depth, roulette_depth, counts: RayCounts::default() }
+    pub fn new(max_depth: u32, roulette_depth: u32, smooth_terminator: bool) -> Self {
+        Self { max_depth, roulette_depth, smooth_terminator, counts: RayCounts::default() }
     }
 }
 
@@ -81,10 +108,14 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
     fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3 {
         let mut radiance = DVec3::ZERO;
         let travel = Sampler::FIRST_FREE + set::TRAVEL;
-        let mut walk = Walk { ray: *ray, depth: 1, throughput: DVec3::ONE, compression: 1.0, last: None, inside: scene.around_eye, travel };
+        let (throughput, inside) = (DVec3::ONE, scene.around_eye);
+        let mut walk = Walk { ray: *ray, depth: 1, throughput, compression: 1.0, last: None, inside, joint: None, travel };
         let mut passed = 0;
         loop {
-            let met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
+            let mut met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
+            if let Some(surface) = met.as_mut().filter(|_| self.smooth_terminator || MEDIA) {
+                self.look_closer(scene, surface, &mut walk);
+            }
             let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
             let next = match self.scattered_on_the_way(scene, &mut walk, met.as_ref(), sampler, sets, &mut radiance) {
                 Some(next) => next,
@@ -109,7 +140,7 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
                 (Next::Passes, Some(surface)) if passed < MOST_PASSED => {
                     walk.travel = set::PASSED + passed;
                     passed += 1;
-                    walk.inside.cross(surface, walk.ray.direction);
+                    walk.inside = walk.beyond::<MEDIA>(surface, walk.ray.direction);
                     walk.ray = surface.spawn(walk.ray.direction);
                     walk.last.iter_mut().for_each(|last| last.distance += surface.t);
                 }
@@ -124,6 +155,19 @@ impl<const MEDIA: bool> Integrator for Path<MEDIA> {
 }
 
 impl<const MEDIA: bool> Path<MEDIA> {
+    /// Looks for what a ray does not tell that meets a surface: other faces in the same place, and the smooth surface that a coarse one stands for.
+    #[inline(always)]
+    fn look_closer(&self, scene: impl Tracer, surface: &mut Surface, walk: &mut Walk) {
+        if MEDIA && scene.may_touch {
+            let joint = walk.inside.joint(&scene, surface, walk.ray.direction);
+            walk.joint = joint.map(|joint| [joint.before, joint.beyond]);
+            *surface = joint.map_or(*surface, |joint| joint.surface);
+        }
+        if self.smooth_terminator {
+            *surface = scene.smoothed(surface, walk.ray.direction);
+        }
+    }
+
     /// Adds what a surface shows by itself and what it scatters once, and chooses where the path goes on.
     #[inline(always)]
     fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sampler: &Sampler, sets: u32, radiance: &mut DVec3) -> Next {
@@ -133,7 +177,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
             *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref());
         }
         let mut room = None;
-        let Some((bsdf, turn)) = bsdf(&scene, material, surface, &walk.inside, &mut room) else { return Next::Passes };
+        let Some((bsdf, turn)) = bsdf(&scene, material, surface, walk.before::<MEDIA>(), &mut room) else { return Next::Passes };
         if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
             return Next::Ends;
         }
@@ -146,7 +190,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
         let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
         if scattered.transmitted && material.recipe.has_inside() {
-            walk.inside.cross(surface, direction);
+            walk.inside = walk.beyond::<MEDIA>(surface, direction);
         }
         Next::Along(scattered, direction, vertex)
     }
@@ -215,7 +259,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         walk.compression *= eta2;
         if walk.depth >= self.roulette_depth {
             // The root: between ending as much as a path has lost, which costs the least time, and never, which adds the least noise.
-            let survival = (walk.throughput * walk.compression).max_element().sqrt();
+            let survival = (walk.throughput * walk.compression).max_element().sqrt().max(LEAST_SURVIVAL);
             if survival < 1.0 {
                 if sampler.one(sets + set::ROULETTE) >= survival {
                     return false;
@@ -286,7 +330,7 @@ impl<const MEDIA: bool> Path<MEDIA> {
         self.counts.shadow += 1;
         let mut inside = walk.inside;
         if let Some(surface) = surface.filter(|surface| MEDIA && goes_through(scene, surface, walk.ray.direction, ray.direction)) {
-            inside.cross(surface, ray.direction);
+            inside = walk.beyond::<MEDIA>(surface, ray.direction);
         }
         f * found::arriving::<MEDIA>(scene, arriving, &ray, &inside) * weight
     }

@@ -76,11 +76,11 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
             scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
-        Render::Path { max_depth, roulette_depth } => {
+        Render::Path { max_depth, roulette_depth, smooth_terminator } => {
             if scene.has_media() {
-                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth), lattice, samples, cancel))
+                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth, smooth_terminator), lattice, samples, cancel))
             } else {
-                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth), lattice, samples, cancel))
+                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth, smooth_terminator), lattice, samples, cancel))
             }
         }
     }

@@ -84,6 +84,7 @@ impl Scene {
             lights,
             environment,
             medium,
+            may_touch: false,
             around_eye: Inside::default(),
             light_sampler,
             filter: PixelFilter::of(frame.film.filter),
