@@ -24,6 +24,8 @@ pub enum ExitCode {
     Denied = 8,
     /// The picture stands, but has holes: parts that no node could render.
     Incomplete = 9,
+    /// The picture stands, but too many of its samples are invalid.
+    Invalid = 10,
     /// The user interrupted it (128 + SIGINT).
     Interrupted = 130,
 }

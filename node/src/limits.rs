@@ -88,6 +88,9 @@ pub const PIXELS_PER_FRAME: u64 = 1 << 30;
 /// A [`crate::wire::PartHeader`] frame.
 pub const PART_HEADER_BYTES: usize = 256;
 
+/// Share of a picture's samples that may be invalid: beyond it, the picture stands, but it is an error.
+pub const INVALID_SAMPLES: f64 = 1e-4;
+
 /// Pixels of one part.
 pub const PART_BYTES: usize = 1 << 30;
 

@@ -346,7 +346,7 @@ function tessera.metal(keys) end
 ---@field reflectance? tessera.Color multiplies what is reflected
 ---@field transmittance? tessera.Color multiplies what is refracted, once at every surface
 ---@field interior? tessera.Medium what fills it, for path: colours it by thickness
----@field priority? number where closed objects of glass overlap, the one of highest priority is there and the borders of the others do not show (give a glass a higher one than the water, and let the water reach a little into it: where two faces lie in the same place, only one of them is met); of equal ones, that which the ray entered last
+---@field priority? number where closed objects of glass overlap, the one of highest priority is there and the borders of the others do not show (give a glass a higher one than the water: their faces may lie in the same place, or the water's a little within the glass); of equal ones, that which the ray entered last
 ---@field multiple_scattering? boolean as for metals
 ---@field name? string for messages
 
@@ -596,8 +596,9 @@ function tessera.whitted(keys) end
 ---@class tessera.PathKeys
 ---@field max_depth? number longest chain of rays, the camera's included: 1 shows only what shines, 2 adds light straight from lights. What longer ones would bring is left out
 ---@field roulette_depth? number chains at least this long are ended by chance where they carry little, which leaves the mean as it is; max_depth for never
+---@field smooth_terminator? boolean whether meshes with vertex normals are shadowed as the smooth surface that these tell of: coarse ones then show no jagged border between light and shadow. It is a bias: where the surface is not as smooth as its normals say, light is not where it should be
 
----Path tracing: all light, whatever way it took, with noise that falls with the number of samples and no other error. raycast and whitted show the nearest of diffuse, mirror and clear glass of each material, the light of tessera.point, spot and directional, and what shines as it is; the rest of this page is for path.
+---Path tracing: all light, whatever way it took, with noise that falls with the number of samples and no other error, unless smooth_terminator is asked for. raycast and whitted show the nearest of diffuse, mirror and clear glass of each material, the light of tessera.point, spot and directional, and what shines as it is; the rest of this page is for path.
 ---@param keys? tessera.PathKeys
 ---@return tessera.Integrator
 function tessera.path(keys) end

@@ -59,7 +59,7 @@ pub fn ground() -> Shape {
 
 /// Path tracing that nothing ends but the number of its rays.
 pub fn path(max_depth: u32) -> Render {
-    Render::Path { max_depth, roulette_depth: max_depth }
+    Render::Path { max_depth, roulette_depth: max_depth, smooth_terminator: false }
 }
 
 impl Stage {

@@ -24,5 +24,8 @@ pub enum Render {
         max_depth: u32,
         /// Chains at least this long are ended by chance, with no error in the mean (Russian roulette); `max_depth` for never.
         roulette_depth: u32,
+        /// Whether light that meets a mesh with vertex normals is shadowed as by the smooth surface that these tell of, and not as by the mesh: without a jagged border between light and
+        /// shadow on coarse meshes, but not without bias.
+        smooth_terminator: bool,
     },
 }

@@ -64,7 +64,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         }
         let mut inside = walk.inside;
         if MEDIA && path::goes_through(scene, surface, walk.ray.direction, direction) {
-            inside.cross(surface, direction);
+            inside = walk.beyond::<MEDIA>(surface, direction);
         }
         let throughput = f / (SENT * density + pdf);
         let begun = Walk { ray: surface.spawn(direction), depth: walk.depth + 1, throughput, inside, ..*walk };
@@ -77,7 +77,10 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         let (mut found, mut gathered) = (DVec3::ZERO, false);
         for passed in 0..MOST_PASSED {
             self.counts.secondary += 1;
-            let met = scene.closest(&walk.ray);
+            let mut met = scene.closest(&walk.ray);
+            if let Some(surface) = met.as_mut() {
+                self.look_closer(scene, surface, &mut walk);
+            }
             if MEDIA && let Some(medium) = walk.inside.medium(&scene) {
                 let distance = met.as_ref().map_or(f64::INFINITY, |surface| surface.t);
                 let Travel::Arrives(weight) = medium.travel(distance, sampler.pair(set::GATHERED + set::PASSED + passed)) else { break };
@@ -91,8 +94,8 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                 found += walk.throughput * found::shining(scene, &surface, emission, walk.ray.direction, None);
             }
             let mut room = None;
-            let Some((bsdf, turn)) = path::bsdf(&scene, material, &surface, &walk.inside, &mut room) else {
-                walk.inside.cross(&surface, walk.ray.direction);
+            let Some((bsdf, turn)) = path::bsdf(&scene, material, &surface, walk.before::<MEDIA>(), &mut room) else {
+                walk.inside = walk.beyond::<MEDIA>(&surface, walk.ray.direction);
                 walk.ray = surface.spawn(walk.ray.direction);
                 continue;
             };
@@ -108,7 +111,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                 break;
             }
             if scattered.transmitted && material.recipe.has_inside() {
-                walk.inside.cross(&surface, direction);
+                walk.inside = walk.beyond::<MEDIA>(&surface, direction);
             }
             walk.throughput *= scattered.weight;
             walk.depth += 1;

@@ -121,10 +121,11 @@ fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &In
             share *= medium.transmittance(way);
         }
         let Some(surface) = met else { return share };
-        if share == DVec3::ZERO || inside.shows(&scene, &surface) {
+        let (shows, beyond) = inside.through(&scene, &surface, ray.direction);
+        if share == DVec3::ZERO || shows {
             return arriving.textured.map_or(DVec3::ZERO, |emitter| share * shown(scene, emitter, &surface, ray.direction));
         }
-        inside.cross(&surface, ray.direction);
+        inside = beyond;
         ray = Ray { t_max: ray.t_max - surface.t, ..surface.spawn(ray.direction) };
     }
     DVec3::ZERO

@@ -20,6 +20,7 @@ use crate::{
 pub struct Path<'s, const MEDIA: bool> {
     pub(super) max_depth: u32,
     roulette_depth: u32,
+    smooth_terminator: bool,
     /// Where light is gathered, if anywhere.
     pub(super) caustics: Option<&'s Caustics>,
     pub(super) counts: RayCounts,
@@ -46,6 +47,9 @@ pub(super) mod set {
 /// Surfaces without effect that a ray goes through before it is given up: objects that touch everywhere would hold it forever.
 pub(super) const MOST_PASSED: u32 = 10_000;
 
+/// Chains end by chance with no smaller chance to go on: one far below 2^-53 could not be told from none, and what went on would be far too bright.
+const LEAST_SURVIVAL: f64 = 1.0 / 256.0;
+
 /// A path as far as it is known.
 pub(super) struct Walk {
     pub(super) ray: Ray,
@@ -61,6 +65,8 @@ pub(super) struct Walk {
     pub(super) chain: Option<Chain>,
     /// What the ray is inside of.
     pub(super) inside: Inside,
+    /// Where several objects have a face where it meets one: what it is inside of at the one that shows, and behind all.
+    pub(super) joint: Option<[Inside; 2]>,
     /// The set of numbers for what happens on the way to the next surface: one for each way, as several lead through media in turn.
     pub(super) travel: u32,
 }
@@ -70,6 +76,25 @@ impl Walk {
     #[inline(always)]
     pub(super) fn is_after_mirror(&self) -> bool {
         self.last.is_none()
+    }
+
+    /// What the ray is inside of where it meets a surface.
+    #[inline(always)]
+    pub(super) fn before<const MEDIA: bool>(&self) -> &Inside {
+        self.joint.as_ref().filter(|_| MEDIA).map_or(&self.inside, |[before, _]| before)
+    }
+
+    /// The same behind it.
+    #[inline(always)]
+    pub(super) fn beyond<const MEDIA: bool>(&self, surface: &Surface, direction: DVec3) -> Inside {
+        match &self.joint {
+            Some([_, beyond]) if MEDIA => *beyond,
+            _ => {
+                let mut beyond = self.inside;
+                beyond.cross(surface, direction);
+                beyond
+            }
+        }
     }
 }
 
@@ -85,8 +110,8 @@ enum Next {
 
 impl<'s, const MEDIA: bool> Path<'s, MEDIA> {
     /// With the settings of [`crate::description::Render::Path`], and what is known of where light is gathered.
-    pub fn new(max_depth: u32, roulette_depth: u32, caustics: Option<&'s Caustics>) -> Self {
-        Self { max_depth, roulette_depth, caustics, counts: RayCounts::default() }
+    pub fn new(max_depth: u32, roulette_depth: u32, smooth_terminator: bool, caustics: Option<&'s Caustics>) -> Self {
+        Self { max_depth, roulette_depth, smooth_terminator, caustics, counts: RayCounts::default() }
     }
 }
 
@@ -103,11 +128,15 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
             last: None,
             chain: None,
             inside: scene.around_eye,
+            joint: None,
             travel,
         };
         let mut passed = 0;
         loop {
-            let met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
+            let mut met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
+            if let Some(surface) = met.as_mut().filter(|_| self.smooth_terminator || MEDIA) {
+                self.look_closer(scene, surface, &mut walk);
+            }
             let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
             let next = match self.scattered_on_the_way(scene, &mut walk, met.as_ref(), sampler, sets, &mut radiance) {
                 Some(next) => next,
@@ -135,7 +164,7 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
                 (Next::Passes, Some(surface)) if passed < MOST_PASSED => {
                     walk.travel = set::PASSED + passed;
                     passed += 1;
-                    walk.inside.cross(surface, walk.ray.direction);
+                    walk.inside = walk.beyond::<MEDIA>(surface, walk.ray.direction);
                     walk.ray = surface.spawn(walk.ray.direction);
                     walk.last.iter_mut().for_each(|last| last.distance += surface.t);
                 }
@@ -150,6 +179,19 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
 }
 
 impl<const MEDIA: bool> Path<'_, MEDIA> {
+    /// Looks for what a ray does not tell that meets a surface: other faces in the same place, and the smooth surface that a coarse one stands for.
+    #[inline(always)]
+    pub(super) fn look_closer(&self, scene: impl Tracer, surface: &mut Surface, walk: &mut Walk) {
+        if MEDIA && scene.may_touch {
+            let joint = walk.inside.joint(&scene, surface, walk.ray.direction);
+            walk.joint = joint.map(|joint| [joint.before, joint.beyond]);
+            *surface = joint.map_or(*surface, |joint| joint.surface);
+        }
+        if self.smooth_terminator {
+            *surface = scene.smoothed(surface, walk.ray.direction);
+        }
+    }
+
     /// Adds what a surface shows by itself and what it scatters once, and chooses where the path goes on.
     #[inline(always)]
     fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sampler: &Sampler, sets: u32, radiance: &mut DVec3) -> Next {
@@ -159,7 +201,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref()) * self.share(walk);
         }
         let mut room = None;
-        let Some((bsdf, turn)) = bsdf(&scene, material, surface, &walk.inside, &mut room) else { return Next::Passes };
+        let Some((bsdf, turn)) = bsdf(&scene, material, surface, walk.before::<MEDIA>(), &mut room) else { return Next::Passes };
         if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
             return Next::Ends;
         }
@@ -175,7 +217,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
         let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
         if scattered.transmitted && material.recipe.has_inside() {
-            walk.inside.cross(surface, direction);
+            walk.inside = walk.beyond::<MEDIA>(surface, direction);
         }
         Next::Along(scattered, direction, vertex)
     }
@@ -244,7 +286,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         walk.compression *= eta2;
         if walk.depth >= self.roulette_depth {
             // The root: between ending as much as a path has lost, which costs the least time, and never, which adds the least noise.
-            let survival = (walk.throughput * walk.compression).max_element().sqrt();
+            let survival = (walk.throughput * walk.compression).max_element().sqrt().max(LEAST_SURVIVAL);
             if survival < 1.0 {
                 if sampler.one(sets + set::ROULETTE) >= survival {
                     return false;
@@ -315,7 +357,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         self.counts.shadow += 1;
         let mut inside = walk.inside;
         if let Some(surface) = surface.filter(|surface| MEDIA && goes_through(scene, surface, walk.ray.direction, ray.direction)) {
-            inside.cross(surface, ray.direction);
+            inside = walk.beyond::<MEDIA>(surface, ray.direction);
         }
         f * found::arriving::<MEDIA>(scene, arriving, &ray, &inside) * weight
     }

@@ -19,7 +19,7 @@ const FLOOR: Shape = Shape::Plane { point: [0.0; 3], normal: [0.0, 1.0, 0.0] };
 const GREY: Material = Material::Diffuse { reflectance: [0.25, 0.5, 0.75], texture: None };
 const RAYCAST: Render = Render::Raycast;
 const WHITTED: Render = Render::Whitted { max_depth: 4, transparent_shadows: false, min_weight: 0.0 };
-const PATH: Render = Render::Path { max_depth: 4, roulette_depth: 4 };
+const PATH: Render = Render::Path { max_depth: 4, roulette_depth: 4, smooth_terminator: false };
 
 /// The floor as `EYE` sees it from above, with something before it.
 fn frame(before: Vec<(Shape, Material)>, render: Render) -> Frame {

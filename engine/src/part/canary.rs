@@ -156,7 +156,7 @@ pub(super) fn in_all_light(mut frame: Frame) -> Frame {
         focus_distance: 5.0,
     };
     frame.film = Film { width: 48, height: 36, filter: Filter::Mitchell };
-    frame.render = Render::Path { max_depth: 8, roulette_depth: 3 };
+    frame.render = Render::Path { max_depth: 8, roulette_depth: 3, smooth_terminator: false };
     frame.quality = Quality { samples: 4 };
     frame
 }

@@ -10,6 +10,8 @@ mod spread;
 #[cfg(test)]
 mod aovs_tests;
 #[cfg(test)]
+mod extremes_tests;
+#[cfg(test)]
 mod tests;
 
 use serde::{Deserialize, Serialize};

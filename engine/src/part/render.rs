@@ -76,12 +76,17 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
             scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
-        Render::Path { max_depth, roulette_depth } => {
+        Render::Path { max_depth, roulette_depth, smooth_terminator } => {
             let caustics = caustics(scene);
             if scene.has_media() {
-                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth, caustics), lattice, samples, cancel))
+                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics), lattice, samples, cancel))
             } else {
-                scene.run(Tracing::new(Path::<false>::new(max_depth, roulette_depth, caustics), lattice, samples, cancel))
+                scene.run(Tracing::new(
+                    Path::<false>::new(max_depth, roulette_depth, smooth_terminator, caustics),
+                    lattice,
+                    samples,
+                    cancel,
+                ))
             }
         }
     }

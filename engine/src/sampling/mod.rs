@@ -1,5 +1,7 @@
 //! Samples: the numbers behind every choice, and what is chosen by them.
 
+#[cfg(test)]
+mod extreme;
 mod filter;
 mod sobol;
 mod warp;
@@ -10,6 +12,8 @@ pub use self::{
     warp::{concentric_disc, cosine_hemisphere, sin_cos_of_turn, uniform_cone, uniform_cone_pdf, uniform_sphere, uniform_triangle},
 };
 
+#[cfg(test)]
+pub(crate) use self::extreme::Numbers;
 pub(crate) use self::sobol::mix;
 
 impl Sampler {

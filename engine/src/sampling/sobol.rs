@@ -100,7 +100,10 @@ fn pascal(mut index: u32) -> u32 {
 #[inline(always)]
 fn unit(leading: u64, tail: u64) -> f64 {
     // Less than 2^53, so both conversions are exact; the signed one is a single instruction on x86.
-    (leading << 21 | tail >> 11) as i64 as f64 * (1.0 / (1u64 << 53) as f64)
+    let number = (leading << 21 | tail >> 11) as i64 as f64 * (1.0 / (1u64 << 53) as f64);
+    #[cfg(test)]
+    let number = super::extreme::instead_of(number);
+    number
 }
 
 #[cfg(test)]

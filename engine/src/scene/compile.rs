@@ -86,6 +86,7 @@ impl Scene {
             lights,
             environment,
             medium,
+            may_touch: false,
             around_eye: Inside::default(),
             light_sampler,
             filter: PixelFilter::of(frame.film.filter),

@@ -39,6 +39,22 @@ impl Geometry {
         self.tree = (!is_empty).then(|| content.bounds()).map(|bounds| content.grow(bounds, leaves));
     }
 
+    /// Boxes around all objects of some materials; planes have no end.
+    pub fn boxes(&self, is_one: impl Fn(u32) -> bool) -> Vec<Bounds> {
+        let everywhere = Bounds { min: DVec3::NEG_INFINITY, max: DVec3::INFINITY };
+        let mut boxes = Vec::new();
+        let mut add = |material: u32, bounds: &dyn Fn() -> Bounds| boxes.extend(is_one(material).then(bounds));
+        self.planes.iter().for_each(|plane| add(plane.material, &|| everywhere));
+        self.spheres.iter().for_each(|sphere| add(sphere.material, &|| sphere.shape.bounds()));
+        self.cuboids.iter().for_each(|cuboid| add(cuboid.material, &|| cuboid.shape.bounds()));
+        self.discs.iter().for_each(|disc| add(disc.material, &|| disc.shape.bounds()));
+        self.others.iter().for_each(|other| add(other.material, &|| other.shape.bounds()));
+        self.transformed.iter().for_each(|of| add(of.material, &|| of.shape.transform.bounds(of.shape.shape.bounds())));
+        let mesh_of = |instance: &Instance| &self.meshes[instance.mesh as usize];
+        self.instances.iter().for_each(|of| add(of.material, &|| of.shape.transform.bounds_of(mesh_of(&of.shape))));
+        boxes
+    }
+
     /// Everything: so many instances triangle by triangle, of the others the boxes.
     fn content(&self, grounded: usize) -> Content<'_> {
         let mut content = Content { origin: self.origin, parts: Vec::new(), boxes: Vec::new(), references: Vec::new() };

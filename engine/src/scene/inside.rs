@@ -17,23 +17,47 @@ pub struct Inside {
 }
 
 /// Objects that may overlap at one place; more are taken for empty space.
-const MOST: usize = 8;
+pub(super) const MOST: usize = 8;
 
 /// Surfaces that are looked at to find out what a point is inside of.
 const MOST_CROSSINGS: u32 = 1024;
 
+/// A closed object.
 #[derive(Clone, Copy, Debug, Default)]
-struct Entry {
-    object: u32,
-    material: u32,
+pub(super) struct Entry {
+    pub object: u32,
+    pub material: u32,
 }
 
 impl Inside {
     /// What a point is inside of, by the borders that a ray from there leaves.
     pub fn of(scene: &Scene, point: DVec3) -> Self {
+        let ray = Ray::new(point, DVec3::new(0.36, 0.8, 0.48));
+        if scene.may_touch { Self::by_parity(scene, &ray) } else { Self::by_borders(scene, ray) }
+    }
+
+    /// Where faces may lie in one place, none may be left out: the start is inside of what the ray crosses an odd number of times.
+    fn by_parity(scene: &Scene, ray: &Ray) -> Self {
+        let mut crossings: Vec<(u32, f64, u32)> = Vec::new();
+        scene.any(ray, |material, crossing| {
+            if scene.materials[material as usize].recipe.has_inside() {
+                crossings.push((crossing.object, crossing.t, material));
+            }
+            false
+        });
+        crossings.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        // A triangle that stands in several leaves is told several times.
+        crossings.dedup_by_key(|&mut (object, t, _)| (object, t.to_bits()));
+        let mut borders: Vec<_> = crossings.chunk_by(|a, b| a.0 == b.0).filter(|of| of.len() % 2 == 1).map(|of| of[0]).collect();
+        borders.sort_by(|a, b| a.1.total_cmp(&b.1));
+        let mut inside = Self::default();
+        borders.iter().for_each(|&(object, _, material)| inside.pass(Entry { object, material }, true));
+        inside
+    }
+
+    fn by_borders(scene: &Scene, mut ray: Ray) -> Self {
         let mut entered: Vec<u32> = Vec::new();
         let mut inside = Self::default();
-        let mut ray = Ray::new(point, DVec3::new(0.36, 0.8, 0.48));
         for _ in 0..MOST_CROSSINGS {
             let Some(surface) = scene.closest(&ray) else { break };
             if scene.materials[surface.material as usize].recipe.has_inside() {
@@ -42,7 +66,7 @@ impl Inside {
                 } else if let Some(at) = entered.iter().position(|&object| object == surface.object) {
                     entered.swap_remove(at);
                 } else {
-                    inside.enter(&surface);
+                    inside.pass(Entry::of(&surface), true);
                 }
             }
             ray = surface.spawn(ray.direction);
@@ -93,20 +117,43 @@ impl Inside {
     /// Goes through a surface along a direction.
     #[inline]
     pub fn cross(&mut self, surface: &Surface, direction: DVec3) {
-        if direction.dot(surface.ng) < 0.0 { self.enter(surface) } else { self.leave(surface) }
+        self.pass(Entry::of(surface), direction.dot(surface.ng) < 0.0);
     }
 
-    fn enter(&mut self, surface: &Surface) {
-        if self.count < MOST {
-            self.entries[self.count] = Entry { object: surface.object, material: surface.material };
-            self.count += 1;
+    /// Whether a surface that a ray of unit direction meets shows, as [`Self::shows`] says, or one in the same place; and what the ray is inside of behind it.
+    pub fn through(&self, scene: &Scene, surface: &Surface, direction: DVec3) -> (bool, Self) {
+        if scene.may_touch
+            && let Some(joint) = self.joint(scene, surface, direction)
+        {
+            return (joint.before.shows(scene, &joint.surface), joint.beyond);
         }
+        let mut beyond = *self;
+        beyond.cross(surface, direction);
+        (self.shows(scene, surface), beyond)
     }
 
-    fn leave(&mut self, surface: &Surface) {
-        if let Some(at) = self.entries[..self.count].iter().rposition(|entry| entry.object == surface.object) {
+    /// Whether an object is one of those.
+    pub(super) fn holds(&self, object: u32) -> bool {
+        self.entries[..self.count].iter().any(|entry| entry.object == object)
+    }
+
+    /// Enters an object, or leaves it.
+    #[inline]
+    pub(super) fn pass(&mut self, of: Entry, enters: bool) {
+        if enters {
+            if self.count < MOST {
+                self.entries[self.count] = of;
+                self.count += 1;
+            }
+        } else if let Some(at) = self.entries[..self.count].iter().rposition(|entry| entry.object == of.object) {
             self.entries.copy_within(at + 1..self.count, at);
             self.count -= 1;
         }
+    }
+}
+
+impl Entry {
+    pub(super) fn of(surface: &Surface) -> Self {
+        Self { object: surface.object, material: surface.material }
     }
 }

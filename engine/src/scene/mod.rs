@@ -9,6 +9,7 @@ mod forest;
 mod geometry;
 mod identity;
 mod inside;
+mod joint;
 mod models;
 mod outlined;
 mod place;
@@ -16,6 +17,7 @@ mod query;
 mod statistics;
 mod stream;
 mod surface;
+mod terminator;
 mod tracer;
 mod unbuilt;
 mod visit;
@@ -25,6 +27,7 @@ mod tests;
 pub use crate::shape::Surface;
 pub use error::{CompileError, Warning};
 pub use inside::Inside;
+pub use joint::Joint;
 pub use query::Hit;
 pub use statistics::Statistics;
 pub use surface::Crossing;
@@ -65,6 +68,8 @@ pub struct Scene {
     pub filter: PixelFilter,
     /// What fills space outside of everything.
     pub medium: Option<Medium>,
+    /// Whether there are several objects with an inside whose boxes touch, for `path`.
+    pub may_touch: bool,
     /// What the camera is inside of.
     pub around_eye: Inside,
     /// What the frame is gathered on.
@@ -92,12 +97,12 @@ impl Scene {
         -self.geometry.origin
     }
 
-    /// Whether something fills space anywhere, or has a border that may not be seen.
+    /// Whether something fills space anywhere, or has a border that may not be seen, or lie where another is.
     pub fn has_media(&self) -> bool {
         let fills = |Material { recipe, .. }: &Material| {
             recipe.interior().is_some() || recipe.priority() > 0 || matches!(recipe, Recipe::Boundary { .. })
         };
-        self.medium.is_some() || self.materials.iter().any(fills)
+        self.may_touch || self.medium.is_some() || self.materials.iter().any(fills)
     }
 
     /// Lights whose light something in the scene may gather, and these things; `None` if there are none.

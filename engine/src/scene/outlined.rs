@@ -1,6 +1,6 @@
 //! Walks through trees as functions of their own.
 
-use super::{Scene, query::Hit, visit::Blocked};
+use super::{Scene, query::Hit, surface::Thing, visit::Blocked};
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
@@ -16,7 +16,7 @@ pub(super) trait Outlined: Lanes {
     unsafe fn closest_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit);
     unsafe fn any_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool;
     unsafe fn closest_of_leaf(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
-    unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool;
+    unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(Thing, f64) -> bool) -> bool;
     unsafe fn closest_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]);
     unsafe fn any_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], is_blocked: &mut [bool], blocked: &mut impl Blocked);
 }
@@ -61,10 +61,10 @@ macro_rules! outlined {
             }
 
             #[inline(always)]
-            unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+            unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(Thing, f64) -> bool) -> bool {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
-                unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+                unsafe fn outlined(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(Thing, f64) -> bool) -> bool {
                     // SAFETY: see above.
                     unsafe { scene.any_of_leaf_in::<$lanes>(ray, reference, blocked) }
                 }

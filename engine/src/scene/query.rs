@@ -8,7 +8,7 @@ use super::{
     Scene, Surface,
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
-    surface::{Crossing, in_world},
+    surface::{Crossing, Thing, in_world},
     tracer::{Tracer, Work},
 };
 #[cfg(target_arch = "x86_64")]
@@ -206,10 +206,10 @@ impl Scene {
         &self,
         ray: &Ray,
         light: Option<usize>,
-        blocked: &mut impl FnMut(u32, f64) -> bool,
+        blocked: &mut impl FnMut(Thing, f64) -> bool,
     ) -> bool {
         let geometry = &self.geometry;
-        if geometry.planes.iter().any(|plane| plane.shape.closest(ray).is_some_and(|t| blocked(plane.material, t))) {
+        if geometry.planes.iter().any(|plane| plane.shape.closest(ray).is_some_and(|t| blocked(plane.thing(), t))) {
             return true;
         }
         if let Some(list) = &geometry.list {
@@ -222,7 +222,7 @@ impl Scene {
             for index in candidates {
                 let sphere = &geometry.spheres[index];
                 let crossings = sphere.shape.crossings::<true>(ray.origin, ray.direction);
-                if crossings.is_some_and(|[near, far]| blocked(sphere.material, near) || blocked(sphere.material, far)) {
+                if crossings.is_some_and(|[near, far]| blocked(sphere.thing(), near) || blocked(sphere.thing(), far)) {
                     return true;
                 }
             }
@@ -240,7 +240,7 @@ impl Scene {
         mut blocks: impl FnMut(u32, &Crossing) -> bool,
     ) -> bool {
         let geometry = &self.geometry;
-        let mut blocked = |material: u32, t: f64| t > 0.0 && t < ray.t_max && blocks(material, &Crossing { t });
+        let mut blocked = |thing: Thing, t: f64| t > 0.0 && t < ray.t_max && blocks(thing.material, &Crossing { t, object: thing.object });
         // SAFETY: the caller has the instructions of `L`.
         if unsafe { self.any_beside_tree::<L>(ray, light, &mut blocked) } {
             return true;
@@ -248,7 +248,7 @@ impl Scene {
         let Some(tree) = &geometry.tree else { return false };
         if !geometry.instances.is_empty() {
             // SAFETY: the caller has the instructions of `L`.
-            return unsafe { L::any_of_tree(self, tree, ray, &mut |_, material, t| blocked(material, t)) };
+            return unsafe { L::any_of_tree(self, tree, ray, &mut |_, thing, t| blocked(thing, t)) };
         }
         let boxed = tree.ray::<true>(ray.origin, ray.direction);
         let limit = boxed.limit(ray.t_max);

@@ -6,7 +6,7 @@ use super::{
     Scene,
     outlined::Outlined,
     query::Hit,
-    surface::Crossing,
+    surface::{Crossing, Thing},
     visit::{Any, Blocked, Closest},
 };
 use crate::{
@@ -52,12 +52,12 @@ impl Scene {
         let mut room = Block::new();
         for (block, rays) in rays.chunks(BLOCK).enumerate() {
             let mut is_blocked = [false; BLOCK];
-            let mut blocked = |ray: usize, material: u32, t: f64| {
-                t > 0.0 && t < rays[ray].t_max && blocks(block * BLOCK + ray, material, &Crossing { t })
+            let mut blocked = |ray: usize, thing: Thing, t: f64| {
+                t > 0.0 && t < rays[ray].t_max && blocks(block * BLOCK + ray, thing.material, &Crossing { t, object: thing.object })
             };
             for (number, ray) in rays.iter().enumerate() {
                 // SAFETY: the caller has the instructions of `L`.
-                is_blocked[number] = unsafe { self.any_beside_tree::<L>(ray, None, &mut |material, t| blocked(number, material, t)) };
+                is_blocked[number] = unsafe { self.any_beside_tree::<L>(ray, None, &mut |thing, t| blocked(number, thing, t)) };
             }
             // SAFETY: the caller has the instructions of `L`.
             unsafe { L::any_of_block(self, tree, &mut room, rays, &mut is_blocked, &mut blocked) };

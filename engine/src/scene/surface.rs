@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::query::Hit;
+use super::{geometry::Placed, query::Hit};
 use crate::shape::{Point, Surface};
 
 /// A surface that a ray crosses, for [`super::Scene::any`].
@@ -10,6 +10,25 @@ use crate::shape::{Point, Surface};
 pub struct Crossing {
     /// Parameter of the ray: the distance, as its direction is a unit vector.
     pub t: f64,
+    /// Place of the object in the order of the scene.
+    pub object: u32,
+}
+
+/// Which thing of a scene a ray crosses.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Thing {
+    /// Place of the object in the order of the scene.
+    pub object: u32,
+    /// Index of its material.
+    pub material: u32,
+}
+
+impl<S> Placed<S> {
+    /// What it is when it is crossed.
+    #[inline(always)]
+    pub(super) fn thing(&self) -> Thing {
+        Thing { object: self.object, material: self.material }
+    }
 }
 
 /// The surface of anything but a mesh.

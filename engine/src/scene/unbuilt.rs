@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{Inside, Scene, Statistics, Warning};
+use super::{Inside, Scene, Statistics, Warning, joint::may_touch};
 use crate::description::Render;
 
 /// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, without the time that building it takes.
@@ -30,6 +30,8 @@ impl Unbuilt {
         scene.geometry.finish(eye, &scene.lights, casts_no_shadow);
         let has_insides = scene.materials.iter().any(|material| material.recipe.has_inside());
         if has_insides && matches!(scene.render, Render::Path { .. }) {
+            let boxes = scene.geometry.boxes(|material| scene.materials[material as usize].recipe.has_inside());
+            scene.may_touch = may_touch(boxes);
             scene.around_eye = Inside::of(&scene, scene.camera.eye());
         }
         scene.statistics = Statistics::of(&scene.geometry);

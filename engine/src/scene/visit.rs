@@ -5,16 +5,17 @@ use super::{
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
     query::Hit,
+    surface::Thing,
 };
 use crate::{
     accel::{MeshHit, Tree, Visitor},
     shape::{Ray, triangle::TriangleHit},
 };
 
-/// Asks whether something of a material stands in the way of a ray at a distance.
-pub(super) trait Blocked: FnMut(usize, u32, f64) -> bool {}
+/// Asks whether something stands in the way of a ray at a distance.
+pub(super) trait Blocked: FnMut(usize, Thing, f64) -> bool {}
 
-impl<F: FnMut(usize, u32, f64) -> bool> Blocked for F {}
+impl<F: FnMut(usize, Thing, f64) -> bool> Blocked for F {}
 
 /// Finds nearest hits.
 pub(super) struct Closest<'a, L> {
@@ -97,7 +98,7 @@ impl<L: Outlined, B: Blocked> Visitor for Any<'_, L, B> {
     fn triangle(&mut self, ray: usize, hit: MeshHit) -> f64 {
         let placed = self.scene.instance(hit.instance);
         let there = !placed.shape.masked || self.scene.is_there(placed, &hit);
-        let is_blocked = there && (self.blocked)(ray, placed.material, hit.at.t);
+        let is_blocked = there && (self.blocked)(ray, placed.thing(), hit.at.t);
         self.note(ray, is_blocked)
     }
 
@@ -110,7 +111,7 @@ impl<L: Outlined, B: Blocked> Visitor for Any<'_, L, B> {
     fn other(&mut self, ray: usize, reference: u32) -> f64 {
         let blocked = &mut *self.blocked;
         // SAFETY: whoever made this has the instructions of `L`.
-        let is_blocked = unsafe { L::any_of_leaf(self.scene, &self.rays[ray], reference, &mut |material, t| blocked(ray, material, t)) };
+        let is_blocked = unsafe { L::any_of_leaf(self.scene, &self.rays[ray], reference, &mut |thing, t| blocked(ray, thing, t)) };
         self.note(ray, is_blocked)
     }
 }
@@ -124,12 +125,12 @@ struct AnyThere<'a, F> {
     blocked: F,
 }
 
-impl<F: FnMut(u32, f64) -> bool> Visitor for AnyThere<'_, F> {
+impl<F: FnMut(Thing, f64) -> bool> Visitor for AnyThere<'_, F> {
     #[inline(always)]
     fn triangle(&mut self, _: usize, hit: MeshHit) -> f64 {
         let (placed, hit) = (self.scene.instance(self.number), MeshHit { instance: self.number, ..hit });
         let there = !placed.shape.masked || self.scene.is_there(placed, &hit);
-        self.is_blocked = there && (self.blocked)(placed.material, hit.at.t);
+        self.is_blocked = there && (self.blocked)(placed.thing(), hit.at.t);
         if self.is_blocked { -1.0 } else { self.t_max }
     }
 
@@ -176,7 +177,12 @@ impl Scene {
     /// # Safety
     /// The processor has the instructions of `L`.
     #[inline(always)]
-    pub(super) unsafe fn any_of_leaf_in<L: Outlined>(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+    pub(super) unsafe fn any_of_leaf_in<L: Outlined>(
+        &self,
+        ray: &Ray,
+        reference: u32,
+        blocked: &mut impl FnMut(Thing, f64) -> bool,
+    ) -> bool {
         if reference >> kind::SHIFT != kind::MESH {
             return self.any_of_shape(ray, reference, blocked);
         }
@@ -237,21 +243,21 @@ impl Scene {
 
     /// See [`Self::closest_of_shape`].
     #[inline(always)]
-    pub(super) fn any_of_shape(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(u32, f64) -> bool) -> bool {
+    pub(super) fn any_of_shape(&self, ray: &Ray, reference: u32, blocked: &mut impl FnMut(Thing, f64) -> bool) -> bool {
         let geometry = &self.geometry;
         let index = (reference & kind::INDEX) as usize;
-        let (crossings, material) = match reference >> kind::SHIFT {
+        let (crossings, thing) = match reference >> kind::SHIFT {
             kind::SPHERE => {
                 let sphere = &geometry.spheres[index];
-                (sphere.shape.crossings::<true>(ray.origin, ray.direction), sphere.material)
+                (sphere.shape.crossings::<true>(ray.origin, ray.direction), sphere.thing())
             }
             kind::CUBOID => {
                 let cuboid = &geometry.cuboids[index];
-                (cuboid.shape.crossings(ray.origin, ray.direction).map(|[near, far]| [near.0, far.0]), cuboid.material)
+                (cuboid.shape.crossings(ray.origin, ray.direction).map(|[near, far]| [near.0, far.0]), cuboid.thing())
             }
             kind::DISC => {
                 let disc = &geometry.discs[index];
-                (disc.shape.closest(ray).map(|t| [t, f64::INFINITY]), disc.material)
+                (disc.shape.closest(ray).map(|t| [t, f64::INFINITY]), disc.thing())
             }
             kind::TRANSFORMED => {
                 let placed = &geometry.transformed[index];
@@ -262,13 +268,13 @@ impl Scene {
                     LocalShape::Disc(disc) => disc.closest(&local).map(|t| [t, f64::INFINITY]),
                     LocalShape::Other(other) => other.crossings(&local),
                 };
-                (crossings, placed.material)
+                (crossings, placed.thing())
             }
             _ => {
                 let other = &geometry.others[index];
-                (other.shape.crossings(ray), other.material)
+                (other.shape.crossings(ray), other.thing())
             }
         };
-        crossings.is_some_and(|[near, far]| blocked(material, near) || blocked(material, far))
+        crossings.is_some_and(|[near, far]| blocked(thing, near) || blocked(thing, far))
     }
 }

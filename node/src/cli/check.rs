@@ -192,7 +192,10 @@ fn render_words(render: &Render) -> String {
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
             format!("whitted, max_depth {max_depth}, transparent_shadows {transparent_shadows}, min_weight {min_weight}")
         }
-        Render::Path { max_depth, roulette_depth } => format!("path, max_depth {max_depth}, roulette_depth {roulette_depth}"),
+        Render::Path { max_depth, roulette_depth, smooth_terminator } => {
+            let biased = if *smooth_terminator { ", smooth_terminator (biased)" } else { "" };
+            format!("path, max_depth {max_depth}, roulette_depth {roulette_depth}{biased}")
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tessera_engine::{part::Rect, scene::Unbuilt};
 
-use super::here;
+use super::{here, render::check_samples};
 use crate::{
     coordinator::{identity, write_pictures},
     error::{Error, ExitCode, Result},
@@ -16,14 +16,15 @@ use crate::{
 /// Renders with `threads` threads, which take parts in the order of the split, and writes EXR and PNG.
 ///
 /// # Errors
-/// When the job's own split fails, or the folder refuses the files.
+/// When the job's own split fails, or the folder refuses the files; or, when they stand, if too many samples are invalid.
 pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
     let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| scene.build());
     let parts = parts(description, threads)?;
-    let film = here::parts(&scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
+    let (film, counters) = here::parts(&scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
     let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;
     write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    check_samples(counters.invalid_samples, counters.camera_rays)?;
     Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())
 }
 

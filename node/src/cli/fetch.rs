@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use super::{
     client::{Access, job_number},
-    render::check_writable,
+    render::{check_samples, check_writable},
     runtime::{block_on, start_logs},
 };
-use crate::{error::Result, farm::JobId};
+use crate::{error::Result, farm::JobId, manifest};
 
 /// Arguments of `tessera fetch`.
 #[derive(clap::Args)]
@@ -22,7 +22,7 @@ pub struct Args {
     output: PathBuf,
 }
 
-/// Runs `tessera fetch`: prints the files' paths.
+/// Runs `tessera fetch`: prints the files' paths; it is an error if too many samples of the picture are invalid.
 pub fn run(args: Args) -> Result<()> {
     start_logs("error");
     check_writable(&args.output)?;
@@ -33,5 +33,7 @@ pub fn run(args: Args) -> Result<()> {
         Ok(files)
     })?;
     files.iter().for_each(|file| println!("{}", file.display()));
-    Ok(())
+    let manifest =
+        files.iter().filter(|file| file.extension().is_some_and(|ending| ending == "json")).find_map(|file| manifest::read(file).ok());
+    manifest.map_or(Ok(()), |manifest| check_samples(manifest.image.invalid_samples, manifest.image.sample_count()))
 }

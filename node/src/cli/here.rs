@@ -13,7 +13,7 @@ use std::{
 
 use tessera_engine::{
     film::Film,
-    part::{self, Rect, SampleRange},
+    part::{self, Counters, Rect, SampleRange},
     scene::Scene,
 };
 
@@ -35,22 +35,26 @@ pub fn threads() -> usize {
 /// # Errors
 /// None in practice: [`ExitCode::Internal`] where a part does not fit on the film.
 pub fn frame(scene: &Scene, samples: u64, done: impl Fn(Rect) + Sync) -> Result<Film> {
-    parts(scene, &split::grid(scene.film.width, scene.film.height, SQUARE, SQUARE), samples, threads(), done)
+    let squares = split::grid(scene.film.width, scene.film.height, SQUARE, SQUARE);
+    parts(scene, &squares, samples, threads(), done).map(|(film, _)| film)
 }
 
-/// Renders parts of a frame with so many threads, which take them in the order given.
+/// Renders parts of a frame with so many threads, which take them in the order given; and counts the work.
 ///
 /// # Errors
 /// [`ExitCode::Internal`] where a part does not fit on the film.
-pub fn parts(scene: &Scene, rects: &[Rect], samples: u64, threads: usize, done: impl Fn(Rect) + Sync) -> Result<Film> {
-    let film = Mutex::new(Film::with_aovs(scene.film.width, scene.film.height, scene.aovs));
+pub fn parts(scene: &Scene, rects: &[Rect], samples: u64, threads: usize, done: impl Fn(Rect) + Sync) -> Result<(Film, Counters)> {
+    let film = Film::with_aovs(scene.film.width, scene.film.height, scene.aovs);
+    let whole = Mutex::new((film, Counters::default()));
     share_out(rects, threads, |rect| {
         let rendered = part::render(scene, *rect, SampleRange { first: 0, count: samples }, &AtomicBool::new(false)).map_err(internal)?;
-        film.lock().unwrap_or_else(PoisonError::into_inner).place(&rendered).map_err(internal)?;
+        let (film, counters) = &mut *whole.lock().unwrap_or_else(PoisonError::into_inner);
+        film.place(&rendered).map_err(internal)?;
+        *counters += rendered.counters;
         done(*rect);
         Ok(())
     })?;
-    Ok(film.into_inner().unwrap_or_else(PoisonError::into_inner))
+    Ok(whole.into_inner().unwrap_or_else(PoisonError::into_inner))
 }
 
 /// Measures every cell of a probe: `(cell, seconds that one thread takes for one sample of a pixel)`, in the order of the cells.

@@ -23,7 +23,7 @@ use crate::{
     error::{Error, ExitCode, Result},
     farm::FarmConfig,
     job::{JobDescription, LoadedJob},
-    limits::NO_NODE_TIMEOUT,
+    limits::{INVALID_SAMPLES, NO_NODE_TIMEOUT},
     manifest,
     report::{self, Style},
     wire::{JobState, tls::Identity},
@@ -157,6 +157,22 @@ pub fn outcome(state: JobState) -> Result<()> {
     }
 }
 
+/// An error for a picture with too many samples that are invalid, of so many.
+///
+/// # Errors
+/// Exactly then.
+pub fn check_samples(invalid: u64, all: u64) -> Result<()> {
+    if invalid as f64 <= INVALID_SAMPLES * all as f64 {
+        return Ok(());
+    }
+    let message = format!(
+        "{invalid} of the picture's {all} samples are invalid (negative, infinite, or no numbers) and count as black: it stands, but is not to be trusted"
+    );
+    Err(Error::new(ExitCode::Invalid, message).with_help(
+        "look for lights whose strength or distance is far from all others; the manifest of a farm's job says in which parts they are",
+    ))
+}
+
 /// Makes the folder where it is missing and sees that files can be written into it, before anything is rendered.
 pub fn check_writable(folder: &Path) -> Result<()> {
     let refused = |error: std::io::Error| {
@@ -169,6 +185,9 @@ pub fn check_writable(folder: &Path) -> Result<()> {
 }
 
 /// The report at the end. What the job's description warns of was said at the beginning, and is not said again.
+///
+/// # Errors
+/// When there is no manifest, or too many samples are invalid.
 pub fn report(show: Show, files: &[PathBuf], manifest: &Path, said: &[String]) -> Result<()> {
     let mut manifest = manifest::read(manifest)?;
     manifest.warnings.retain(|warning| !said.contains(warning));
@@ -177,7 +196,7 @@ pub fn report(show: Show, files: &[PathBuf], manifest: &Path, said: &[String]) -
     } else if !show.quiet {
         print!("{}", report::text(&manifest, files, Style { color: std::io::stdout().is_terminal() }));
     }
-    Ok(())
+    check_samples(manifest.image.invalid_samples, manifest.image.sample_count())
 }
 
 fn show_files(show: Show, files: &[PathBuf]) -> Result<()> {

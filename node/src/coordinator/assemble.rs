@@ -66,7 +66,8 @@ fn write_files(assembly: &Assembly, picture: &mut Bands) -> Result<ReportEntry, 
     if record.build.is_some_and(|build| build.revision == stored.revision) {
         (identity.image_hash, identity.engine_revision) = (stored.image_hash.clone(), stored.revision);
     }
-    let image = write_pictures(&stored.description, &identity, picture, &assembly.holes, &assembly.files)?;
+    let mut image = write_pictures(&stored.description, &identity, picture, &assembly.holes, &assembly.files)?;
+    image.invalid_samples = record.parts.iter().map(|part| part.invalid_samples).sum();
     let submission = Submission {
         id: job.0,
         name: stored.description.name.clone(),
@@ -89,7 +90,7 @@ pub fn identity(description: &JobDescription) -> Result<exr::Identity, String> {
     Ok(exr::Identity::new(hash, description.frame.seed))
 }
 
-/// Writes the EXR and the preview into a folder, and says what there is to know of them. Holes are black in the one, and marked in the other.
+/// Writes the EXR and the preview into a folder, and says what there is to know of them but for samples that were invalid: pixels do not tell. Holes are black in the one, and marked in the other.
 ///
 /// # Errors
 /// In words, when the disk refuses.
@@ -126,6 +127,7 @@ pub fn write_pictures(
         aovs: picture.aovs().iter().map(|aov| aov.name().to_owned()).collect(),
         pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
         clamped,
+        invalid_samples: 0,
         holes,
     })
 }

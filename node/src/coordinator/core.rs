@@ -341,7 +341,7 @@ impl Core {
     }
 
     fn delivered(&mut self, node: NodeId, incarnation: Incarnation, header: &PartHeader, bytes: Vec<u8>) -> Option<Event> {
-        let PartHeader { job, lease, seconds, hash, .. } = *header;
+        let PartHeader { job, lease, seconds, hash, invalid_samples, .. } = *header;
         let handed_out = self.shared.leases.get(job, lease).is_some_and(|lease| lease.incarnation == incarnation);
         if !handed_out || bytes.is_empty() {
             self.say(node, incarnation, ToNode::Settled { job, lease });
@@ -351,7 +351,7 @@ impl Core {
             return Some(Event::NodeHeard { node, incarnation });
         }
         self.pixels.insert((job, lease), Arrived { length: bytes.len(), bytes, at: Instant::now() });
-        Some(Event::Rendered { node, incarnation, job, lease, hash, seconds })
+        Some(Event::Rendered { node, incarnation, job, lease, hash, seconds, invalid_samples })
     }
 
     /// What an answer tells that does not count any more: that its node lives, and perhaps that a lane does not hang.

@@ -19,6 +19,7 @@ pub(super) struct Delivery {
     pub lease: LeaseId,
     pub hash: [u8; 32],
     pub seconds: f64,
+    pub invalid_samples: u64,
 }
 
 impl Farm {
@@ -42,7 +43,7 @@ impl Farm {
 impl Job {
     /// Takes the pixels of an attempt, if they are the first of their part.
     fn deliver(&mut self, turn: &mut Turn, nodes: &mut Nodes, delivery: Delivery) -> Result<(), DiscardReason> {
-        let Delivery { node, incarnation, lease, hash, seconds } = delivery;
+        let Delivery { node, incarnation, lease, hash, seconds, invalid_samples } = delivery;
         let Some(of) = self.leases.get(&lease).filter(|of| (of.node, of.incarnation) == (node, incarnation)) else {
             return Err(self.why_unknown(lease));
         };
@@ -66,10 +67,13 @@ impl Job {
             self.compare(lease, part);
             return Err(DiscardReason::Compared);
         }
+        let samples = self.spec.samples;
         self.unplace(part);
         self.loose.remove(&part);
         self.committing.insert(lease, part);
-        self.part_mut(part).place = Place::Committing(lease);
+        let state = self.part_mut(part);
+        // Who says more than there are does not tell the truth.
+        (state.place, state.invalid_samples) = (Place::Committing(lease), invalid_samples.min(state.rect.area().saturating_mul(samples)));
         self.cancel_attempts(turn, nodes, part, "another attempt was first");
         self.choose_for_audit(part);
         turn.put(Command::Commit { job: self.id, part, lease });

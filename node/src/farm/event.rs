@@ -214,6 +214,8 @@ pub enum Event {
         hash: [u8; 32],
         /// Seconds that the lane took.
         seconds: f64,
+        /// Samples that were invalid, and count as black.
+        invalid_samples: u64,
     },
     /// A node could not render a part.
     RenderFailed {

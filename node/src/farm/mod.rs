@@ -108,8 +108,8 @@ impl Farm {
             Event::Probed { node, incarnation, job, cells } => {
                 self.of_node(node, incarnation, job, |job, _, _| job.probed(node, &cells));
             }
-            Event::Rendered { node, incarnation, job, lease, hash, seconds } => {
-                self.rendered(job, Delivery { node, incarnation, lease, hash, seconds });
+            Event::Rendered { node, incarnation, job, lease, hash, seconds, invalid_samples } => {
+                self.rendered(job, Delivery { node, incarnation, lease, hash, seconds, invalid_samples });
             }
             Event::RenderFailed { node, incarnation, job, lease, reason } => {
                 self.stopped(node, incarnation, job, lease);

@@ -54,6 +54,8 @@ pub(super) struct PartState {
     pub planned: Option<NodeId>,
     /// Nodes that delivered it, with the hashes of their pixels: first the one whose pixels are taken, then those that were asked to compare.
     pub votes: Vec<(NodeId, [u8; 32])>,
+    /// Invalid samples of the pixels that are taken, as their node says.
+    pub invalid_samples: u64,
     /// Nodes that said they could not, or died of it, with reasons.
     pub failures: Vec<(NodeId, String)>,
     /// Whether it was cut from a part that nobody could render.
@@ -98,6 +100,7 @@ impl PartState {
             place: Place::Loose,
             planned: None,
             votes: Vec::new(),
+            invalid_samples: 0,
             failures: Vec::new(),
             suspect: false,
             replaced_by: Vec::new(),
@@ -179,6 +182,7 @@ impl PartState {
             predicted: self.cost,
             planned: self.planned,
             hash: hash.map(|hash| hash.iter().map(|byte| format!("{byte:02x}")).collect()),
+            invalid_samples: if self.committed_by().is_some() { self.invalid_samples } else { 0 },
             replaced_by: self.replaced_by.clone(),
             attempts: self.attempts.iter().map(entry).collect(),
         }

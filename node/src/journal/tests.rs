@@ -36,7 +36,7 @@ fn life() -> Vec<(Duration, Event)> {
         Event::Prepared { node, incarnation, job, result: Ok(()) },
     ];
     for lease in (1..5).map(lease) {
-        events.push(Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
+        events.push(Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0, invalid_samples: 0 });
         events.push(Event::NodeHeard { node, incarnation });
         events.push(Event::Committed { job, lease });
     }
@@ -218,7 +218,12 @@ fn a_renewed_journal_goes_on_as_the_farm_does() {
     let open = |farm: &Farm, job| farm.record(job).unwrap().parts.iter().flat_map(|part| part.attempts.clone()).find(|it| it.end.is_none());
     for at in 6..10 {
         let lease = LeaseId(open(&farm, job).unwrap().lease);
-        takes(&mut journal, &mut farm, at, Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0 });
+        takes(
+            &mut journal,
+            &mut farm,
+            at,
+            Event::Rendered { node, incarnation, job, lease, hash: [1; 32], seconds: 1.0, invalid_samples: 0 },
+        );
         takes(&mut journal, &mut farm, at, Event::Committed { job, lease });
     }
     let info = NodeInfo { name: "second".into(), lanes: 1, build: "b".into(), address: "a".into() };

@@ -48,6 +48,7 @@ pub struct Submission {
 pub fn build(submission: Submission, image: ImageEntry, record: JobRecord, total: f64) -> Manifest {
     let mut warnings = submission.warnings;
     warnings.extend(record.warnings);
+    warnings.extend(invalid_samples(&image));
     let mut manifest = Manifest {
         version: VERSION,
         program: program(),
@@ -81,6 +82,11 @@ pub fn build(submission: Submission, image: ImageEntry, record: JobRecord, total
 /// Version and engine revision of this program, as they stand in manifests.
 pub fn program() -> String {
     format!("tessera {} (engine revision {})", env!("CARGO_PKG_VERSION"), tessera_engine::REVISION)
+}
+
+fn invalid_samples(image: &ImageEntry) -> Option<String> {
+    let (invalid, all) = (image.invalid_samples, image.sample_count());
+    (invalid > 0).then(|| format!("{invalid} of {all} samples are invalid (negative, infinite, or no numbers): they count as black"))
 }
 
 fn sum_up_nodes(manifest: &mut Manifest) {

@@ -72,6 +72,7 @@ impl Example {
             predicted,
             planned: Some(NodeId(0)),
             hash: Some("00".repeat(32)),
+            invalid_samples: 0,
             attempts: attempts.collect(),
             replaced_by: Vec::new(),
         });
@@ -104,6 +105,7 @@ impl Example {
             aovs: Vec::new(),
             pixels_hash: "22".repeat(32),
             clamped: 0,
+            invalid_samples: 0,
             holes: Vec::new(),
         };
         build(submission, image, self.record, 42.0)

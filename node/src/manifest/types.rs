@@ -91,6 +91,16 @@ pub struct ImageEntry {
     pub holes: Vec<[u32; 4]>,
     /// Values that half floats could not hold and that were clamped, where the EXR holds half floats.
     pub clamped: u64,
+    /// Samples with a component that was negative or no finite number: they count as black.
+    #[serde(default)]
+    pub invalid_samples: u64,
+}
+
+impl ImageEntry {
+    /// Samples of all pixels.
+    pub fn sample_count(&self) -> u64 {
+        u64::from(self.width).saturating_mul(self.height.into()).saturating_mul(self.samples)
+    }
 }
 
 /// How an EXR holds its numbers.
@@ -162,6 +172,9 @@ pub struct PartEntry {
     /// BLAKE3 of its rectangle (four little-endian u32) and its pixels (as in [`ImageEntry::pixels_hash`], but never rounded to half floats, and with all
     /// that it tells beside colours behind all of these), in hexadecimal, once it is committed.
     pub hash: Option<String>,
+    /// Samples of its pixels that are invalid: see [`ImageEntry::invalid_samples`].
+    #[serde(default)]
+    pub invalid_samples: u64,
     /// Attempts in order of their start.
     pub attempts: Vec<AttemptEntry>,
     /// Smaller parts that took its place, where it was cut up.

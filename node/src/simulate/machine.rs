@@ -200,7 +200,7 @@ impl Node {
         } else {
             let hash = true_hash(job, self.build, rect).map(|byte| if self.corrupt { byte ^ (1 + self.id.0 as u8) } else { byte });
             let seconds = self.measures_next.take().unwrap_or(seconds);
-            Event::Rendered { node, incarnation, job, lease, hash, seconds }
+            Event::Rendered { node, incarnation, job, lease, hash, seconds, invalid_samples: 0 }
         };
         self.delivered.insert(lease, (job, event.clone()));
         let mut acts = vec![Act::Say(0.0, event)];

@@ -71,6 +71,7 @@ mod tests {
             predicted: 3.0,
             planned: None,
             hash: None,
+            invalid_samples: 0,
             attempts,
             replaced_by: Vec::new(),
         };

@@ -148,6 +148,8 @@ pub struct PartHeader {
     pub seconds: f64,
     /// As [`tessera_engine::part::RenderedPart::hash`] gives it: over rectangle and pixels.
     pub hash: [u8; 32],
+    /// Samples that were invalid: see [`tessera_engine::part::Counters::invalid_samples`].
+    pub invalid_samples: u64,
 }
 
 /// A sign of life, sent as a datagram so that no bulk stream holds it up.

@@ -241,7 +241,8 @@ impl Life {
         let work = move || {
             let start = Instant::now();
             let rendered = render(&scene, rect, samples, &cancel).ok()?;
-            let header = PartHeader { job, lease, frame, seconds: start.elapsed().as_secs_f64(), hash: rendered.hash() };
+            let (seconds, invalid_samples) = (start.elapsed().as_secs_f64(), rendered.counters.invalid_samples);
+            let header = PartHeader { job, lease, frame, seconds, hash: rendered.hash(), invalid_samples };
             Some(Delivery { header, bytes: rendered.to_bytes() })
         };
         self.lanes.add(work, move |result| drop(done.send(Done::Rendered(job, lease, result))));

@@ -114,7 +114,7 @@ fn node_says(seeds: &mut Vec<Seed>) {
     each(seeds, "wire_control", "node", &said);
     let part = RenderedPart::from_bytes(Rect { x: 3, y: 144, width: 2, height: 1 }, Aovs::NONE, Counters::default(), &[63; 24]).unwrap();
     let (job, lease) = (JobId(part.rect.x.into()), LeaseId(part.rect.y.into()));
-    let header = PartHeader { job, lease, frame: AssetId::of(OBJ), seconds: 0.5, hash: part.hash() };
+    let header = PartHeader { job, lease, frame: AssetId::of(OBJ), seconds: 0.5, hash: part.hash(), invalid_samples: 1 };
     seeds.push(("wire_part", "two_pixels".into(), [wire::encode(&header, 256).unwrap(), part.to_bytes()].concat()));
 }
 
@@ -314,7 +314,7 @@ fn troubles() -> Vec<Event> {
     let (node, incarnation, job) = (NODE, LIFE, JOB);
     let lease = |number: u64| LeaseId((1 << 40) + number);
     vec![
-        Event::Rendered { node, incarnation, job, lease: lease(1), hash: [1; 32], seconds: 0.1 },
+        Event::Rendered { node, incarnation, job, lease: lease(1), hash: [1; 32], seconds: 0.1, invalid_samples: 2 },
         Event::Committed { job, lease: lease(1) },
         Event::RenderFailed { node, incarnation, job, lease: lease(2), reason: "no luck".into() },
         Event::PixelsLost { job, part: PartId(0), reason: "gone".into() },

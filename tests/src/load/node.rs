@@ -168,7 +168,7 @@ impl Node {
         let connection = self.connection.clone();
         tokio::spawn(async move {
             let (bytes, hash) = noise::part(rect);
-            let header = PartHeader { job, lease, frame, seconds: pace.as_secs_f64(), hash };
+            let header = PartHeader { job, lease, frame, seconds: pace.as_secs_f64(), hash, invalid_samples: 0 };
             let Ok(mut stream) = connection.open_uni().await else { return };
             if wire::write(&mut stream, &header, PART_HEADER_BYTES).await.is_ok() && stream.write_all(&bytes).await.is_ok() {
                 let _ = stream.finish();

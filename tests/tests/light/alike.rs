@@ -176,7 +176,7 @@ fn lights_have_no_unit() {
             }
         }
         stage.scene.background = Environment::Constant(times([0.1, 0.15, 0.2]));
-        let scene = stage.compiled(camera(), film(Filter::Box), Render::Path { max_depth: 8, roulette_depth: 3 });
+        let scene = stage.compiled(camera(), film(Filter::Box), Render::Path { max_depth: 8, roulette_depth: 3, smooth_terminator: false });
         let pixels = seeds::picture(&scene, SampleRange { first: 0, count: 4 });
         pixels.iter().flatten().map(|x| (x / factor).to_bits()).collect::<Vec<_>>()
     };

@@ -54,7 +54,7 @@ fn what_is_white_is_not_seen_in_an_even_sky() {
         .with(Shape::Box { min: [0.5, 0.0, -1.0], max: [1.0, 1.0, 1.0] }, Material::Mirror { reflectance: [1.0; 3] })
         .within(SKY);
     assert_exactly("valley", valley.seen([0.2, 3.0, 0.3], [0.1, 0.0, 0.0], path(100_000), 4), sky(1.0));
-    for render in [path(1000), Render::Path { max_depth: 1000, roulette_depth: 2 }] {
+    for render in [path(1000), Render::Path { max_depth: 1000, roulette_depth: 2, smooth_terminator: false }] {
         assert_is("smooth glass", across_a_sphere(glass(1.5, 0.0), render.clone(), 256), sky(1.0));
     }
 }
@@ -65,7 +65,7 @@ fn what_is_rough_and_white_is_hardly_seen_in_an_even_sky() {
     let mut wrong = Vec::new();
     for roughness in [0.01, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0] {
         for (what, material) in [("metal", metal(roughness)), ("glass", glass(1.5, roughness))] {
-            let seen = across_a_sphere(material, Render::Path { max_depth: 1000, roulette_depth: 2 }, 256)[0];
+            let seen = across_a_sphere(material, Render::Path { max_depth: 1000, roulette_depth: 2, smooth_terminator: false }, 256)[0];
             let (off, error) = (seen.mean / f64::from(SKY[0]) - 1.0, seen.error() / f64::from(SKY[0]));
             let found = format!("{what} of roughness {roughness}: {:+.3} % +- {:.3} %", 100.0 * off, 100.0 * error);
             println!("{found}");
@@ -93,7 +93,7 @@ fn roulette_changes_nothing_but_noise() {
             stage.seen([0.2, 0.9, 3.0], [0.4, 0.35, 0.0], render, 512)
         };
         let never = seen(path(60));
-        assert_alike(what, seen(Render::Path { max_depth: 60, roulette_depth: 1 }), never);
+        assert_alike(what, seen(Render::Path { max_depth: 60, roulette_depth: 1, smooth_terminator: false }), never);
     }
 }
 
@@ -110,7 +110,7 @@ fn a_cavity_adds_up_all_its_reflections() {
         let shape = sphere([0.0; 3], radius);
         if hidden { stage.with_stretched(shape, lamp(radiance), [1.0 + 1e-9, 1.0, 1.0]) } else { stage.with(shape, lamp(radiance)) }
     };
-    for (render, samples) in [(path(200), 64), (Render::Path { max_depth: 200, roulette_depth: 1 }, 256)] {
+    for (render, samples) in [(path(200), 64), (Render::Path { max_depth: 200, roulette_depth: 1, smooth_terminator: false }, 256)] {
         let seen = cavity(false).seen([0.6, 0.1, 0.0], [0.9, 0.2, 0.1], render.clone(), samples);
         assert_is("cavity", seen, expected);
         assert_is("cavity, hidden lamp", cavity(true).seen([0.6, 0.1, 0.0], [0.9, 0.2, 0.1], render, 4 * samples), expected);

@@ -4,9 +4,12 @@
 
 mod alike;
 mod closed;
+mod coincident;
 mod furnace;
 mod media;
 mod ranges;
+mod specular;
+mod terminator;
 mod together;
 
 use tessera_tests::statistics::{Estimate, SIGNIFICANCE, sidak};

@@ -125,7 +125,7 @@ fn white_smoke_is_not_seen_in_an_even_sky() {
     let seen = Stage::new().with(sphere([0.0; 3], 1.0), milk).within(SKY).seen(
         EYE,
         [0.2, 0.3, 0.0],
-        Render::Path { max_depth: 100_000, roulette_depth: 5 },
+        Render::Path { max_depth: 100_000, roulette_depth: 5, smooth_terminator: false },
         1024,
     );
     assert_is("a ball of milk", seen, sky([1.0; 3]));

@@ -1,9 +1,15 @@
 //! Numbers from one end of what can be told to the other.
 
-use std::f64::consts::FRAC_1_PI;
+use std::{f64::consts::FRAC_1_PI, hint::black_box};
 
-use tessera_engine::description::{Material, Render, Rgb, Shape};
-use tessera_tests::stage::{Stage, diffuse, ground, lamp, path, point, rectangle, sphere};
+use tessera_engine::{
+    description::{Camera, Film, Filter, Material, Render, Rgb, Shape},
+    part::SampleRange,
+};
+use tessera_tests::{
+    seeds,
+    stage::{Stage, diffuse, ground, lamp, path, point, rectangle, sphere},
+};
 
 use super::{assert_exactly, assert_is};
 
@@ -51,4 +57,56 @@ fn lamps_without_area_or_power_are_nothing() {
     stage = stage.with_mesh(&[[2.0, 1.0, 0.0], [2.0, 1.0, 0.0], [3.0, 1.0, 0.0], [2.5, 1.0, 0.0]], &[[0, 1, 2], [1, 2, 3]], lamp([1e9; 3]));
     let seen = stage.seen([0.0, 0.3, 3.0], [0.0; 3], path(2), 64);
     assert_is("lamp", seen, radiance.map(|x| f64::from(x) * 0.125));
+}
+
+/// Two mirrors that leave 1e-38 of the light, before a floor that 1e38 falls on: chains end by chance at the second, without error in the mean.
+#[test]
+fn what_carries_next_to_nothing_ends_by_chance_without_bias() {
+    let mirror = |y: f64, z: f64| {
+        (rectangle([-1.0, y, z], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]), Material::Mirror { reflectance: [1e-19, 2e-19, 1e-20] })
+    };
+    let [(low, faint), (high, _)] = [mirror(0.0, -1.0), mirror(2.0, 1.0)];
+    // Down to (0, 0, 0), up to (0, 2, 2), down to (0, -2, 6), where the floor's light is.
+    let floor = Shape::Plane { point: [0.0, -2.0, 0.0], normal: [0.0, 1.0, 0.0] };
+    let stage =
+        Stage::new().with(low, faint.clone()).with(high, faint).with(floor, diffuse([0.5; 3])).lit(point([0.0, 0.0, 6.0], [1e38; 3]));
+    let render = Render::Path { max_depth: 4, roulette_depth: 2, smooth_terminator: false };
+    let seen = stage.seen([0.0, 1.0, -1.0], [0.0; 3], render, 1 << 8);
+    let light = 0.5 * FRAC_1_PI * f64::from(1e38_f32) / 4.0;
+    assert_is("two faint mirrors", seen, [1e-19_f32, 2e-19, 1e-20].map(|share| light * f64::from(share).powi(2)));
+}
+
+/// Radiance and what of it is scattered as single precision holds it with the fewest bits: the picture is that of a scene brighter by a power of two, but for the last bit that there is.
+#[test]
+fn the_smallest_numbers_are_kept() {
+    let tiny = 2f32.powi(-130);
+    let stage = |unit: f32| {
+        let room = Stage::new()
+            .with(ground(), diffuse([0.5, 0.25, 0.75]))
+            .with(sphere([0.0, 1.0, 0.0], 0.5), lamp([unit, 0.75 * unit, 0.5 * unit]));
+        let glass = Material::smooth_glass(1.5, [1.0; 3]);
+        room.with(sphere([1.0, 0.5, 0.5], 0.5), glass).lit(point([-1.0, 1.0, 0.0], [unit; 3])).within([0.0, 0.125 * unit, 0.25 * unit])
+    };
+    for render in [path(6), whitted()] {
+        let film = Film { width: 64, height: 48, filter: Filter::Box };
+        let picture = |unit: f32| {
+            let scene = stage(unit).compiled(
+                Camera::pinhole([0.0, 1.0, 4.0], [0.0, 0.5, 0.0], [0.0, 1.0, 0.0], 50.0),
+                film.clone(),
+                render.clone(),
+            );
+            seeds::picture(&scene, SampleRange { first: 0, count: 16 })
+        };
+        let (faint, bright) = (picture(tiny), picture(1.0));
+        let mut subnormal = 0;
+        for (faint, bright) in faint.iter().flatten().zip(bright.iter().flatten()) {
+            subnormal += u32::from(faint.is_subnormal());
+            let error = (f64::from(*faint) - f64::from(*bright) * f64::from(tiny)).abs();
+            assert!(error <= 2f64.powi(-149), "{faint:e} is not {bright:e} * 2^-130");
+        }
+        // The sphere is lit too: no number of the picture is a normal one, and nearly all are above 0.
+        assert!(subnormal > 7_000, "only {subnormal} of 9216 numbers are subnormal");
+    }
+    // Nor has anything told the processor to take them for 0.
+    assert!(black_box(f32::MIN_POSITIVE) * black_box(0.5) > 0.0 && black_box(f64::MIN_POSITIVE) * black_box(0.5) > 0.0);
 }

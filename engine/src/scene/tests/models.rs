@@ -178,7 +178,7 @@ fn shining_models_light_the_scene() {
     let (mut frame, assets) = frame_of(cube, DAffine3::IDENTITY);
     frame.camera = Camera::pinhole([0.4, 0.5, 0.6], [1.0, 0.4, 0.3], [0.0, 1.0, 0.0], 60.0);
     frame.film = Film { width: 8, height: 8, filter: Filter::Point };
-    frame.render = Render::Path { max_depth: 3, roulette_depth: 3 };
+    frame.render = Render::Path { max_depth: 3, roulette_depth: 3, smooth_terminator: false };
     frame.quality.samples = 256;
     let scene = Scene::compile(&frame, &assets).unwrap();
     assert_eq!(scene.light_sampler.emitters.len(), 12);

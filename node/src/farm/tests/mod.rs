@@ -55,7 +55,7 @@ impl Bench {
 
     fn rendered(&mut self, node: u32, life: u64, lease: LeaseId) {
         let (node, incarnation) = (NodeId(node), Incarnation(life));
-        self.does(Event::Rendered { node, incarnation, job: JOB, lease, hash: [3; 32], seconds: 1.0 });
+        self.does(Event::Rendered { node, incarnation, job: JOB, lease, hash: [3; 32], seconds: 1.0, invalid_samples: 0 });
     }
 
     fn commits(&self) -> Vec<LeaseId> {

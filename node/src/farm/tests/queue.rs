@@ -44,7 +44,15 @@ impl Bench {
         let (node, lease) = self.running(job)[0];
         let job = JobId(job);
         let area = self.farm.parts(job).iter().find(|part| part.id.0 == 0).unwrap().rect.area();
-        self.does(Event::Rendered { node, incarnation: Incarnation(1), job, lease, hash: [3; 32], seconds: area as f64 / 256.0 });
+        self.does(Event::Rendered {
+            node,
+            incarnation: Incarnation(1),
+            job,
+            lease,
+            hash: [3; 32],
+            seconds: area as f64 / 256.0,
+            invalid_samples: 0,
+        });
         self.prepare();
         self.does(Event::Committed { job, lease });
         self.prepare();
@@ -243,7 +251,7 @@ fn files_that_hold_pixels_of_a_quarantined_node_are_made_again() {
     while !bad(&bench) {
         let (node, lease) = bench.running(2)[0];
         let hash = if node.0 == 0 { [9; 32] } else { [3; 32] };
-        bench.does(Event::Rendered { node, incarnation: Incarnation(1), job: JobId(2), lease, hash, seconds: 1.0 });
+        bench.does(Event::Rendered { node, incarnation: Incarnation(1), job: JobId(2), lease, hash, seconds: 1.0, invalid_samples: 0 });
         bench.does(Event::Committed { job: JobId(2), lease });
     }
     let left = bench.farm.jobs()[0].committed;

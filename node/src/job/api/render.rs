@@ -12,7 +12,7 @@ use crate::job::{
 pub const FUNCTIONS: &[Function] = &[
     Function { path: "raycast", form: Form::Table, keys: &[], make: raycast },
     Function { path: "whitted", form: Form::Table, keys: &["max_depth", "transparent_shadows", "min_weight"], make: whitted },
-    Function { path: "path", form: Form::Table, keys: &["max_depth", "roulette_depth"], make: path },
+    Function { path: "path", form: Form::Table, keys: &["max_depth", "roulette_depth", "smooth_terminator"], make: path },
 ];
 
 /// Deepest ray tree: deeper ones change no pixel, and rays are followed on the stack.
@@ -38,5 +38,6 @@ fn whitted(keys: &Keys) -> mlua::Result<Value> {
 fn path(keys: &Keys) -> mlua::Result<Value> {
     let max_depth = keys.or("max_depth", 16, |field| field.integer32(1, LONGEST))?;
     let roulette_depth = keys.or("roulette_depth", 3, |field| field.integer32(1, LONGEST))?;
-    keys.make(|_| Thing::Render(Render::Path { max_depth, roulette_depth }))
+    let smooth_terminator = keys.or("smooth_terminator", false, |field| field.boolean())?;
+    keys.make(|_| Thing::Render(Render::Path { max_depth, roulette_depth, smooth_terminator }))
 }
