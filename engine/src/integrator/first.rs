@@ -37,7 +37,7 @@ pub fn first(scene: impl Tracer, ray: &Ray) -> Option<First> {
     let (mut surface, mut ray, mut before, mut inside) = (surface, *ray, 0.0, scene.around_eye);
     for _ in 0..path::MOST_PASSED {
         let material = &scene.materials[surface.material as usize];
-        if path::bsdf(&scene, material, &surface, &inside, &mut None).is_some() {
+        if path::bsdf(&scene, material, &surface, ray.direction, &inside, &mut None).is_some() {
             return Some(seen(scene, &surface, &ray, before, Some(material)));
         }
         inside.cross(&surface, ray.direction);

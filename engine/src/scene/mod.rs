@@ -1,6 +1,7 @@
 //! The compiled scene: all that a frame's rays need, immutable and shared by all threads.
 
 mod compile;
+mod directions;
 mod emitters;
 mod error;
 mod explain;
