@@ -52,6 +52,11 @@ impl Plane {
         Self { corner, right: axes.right * pixel, down: axes.upright * -pixel }
     }
 
+    /// Unit vector along the view.
+    fn forward(&self) -> DVec3 {
+        self.right.cross(self.down).normalize()
+    }
+
     #[inline(always)]
     fn at(&self, x: f64, y: f64) -> DVec3 {
         self.corner + self.right * x + self.down * y
@@ -177,6 +182,27 @@ impl Camera {
                 Ray::new(self.eye, (level * sin_polar + axes.upright * cos_polar).normalize())
             }
         }
+    }
+}
+
+impl Camera {
+    /// How far a place moves on its tangent plane when it is seen one pixel to the right, and one pixel down, of where it is: to first order
+    /// (Igehy, "Tracing Ray Differentials", 1999). A thin lens sees as its middle does. Not finite where the plane is seen edge on.
+    pub fn pixel_on(&self, place: DVec3, normal: DVec3) -> [DVec3; 2] {
+        let from_eye = place - self.eye;
+        let (view, beside) = match &self.projection {
+            Projection::Pinhole(plane) | Projection::ThinLens { plane, .. } => {
+                let depth = plane.forward().dot(from_eye);
+                (from_eye, [plane.right * depth, plane.down * depth])
+            }
+            Projection::Orthographic { plane, forward } => (*forward, [plane.right, plane.down]),
+            Projection::Panoramic { axes, radians_per_pixel } => {
+                let right = from_eye.cross(axes.upright);
+                (from_eye, [right * radians_per_pixel.x, from_eye.cross(right.normalize_or_zero()) * radians_per_pixel.y])
+            }
+        };
+        let slope = normal / normal.dot(view);
+        beside.map(|step| step - view * slope.dot(step))
     }
 }
 

@@ -330,7 +330,7 @@ function tessera.mirror(keys) end
 ---@field k? tessera.Color its imaginary part, the absorption
 ---@field reflectance? tessera.Color what is reflected straight on
 ---@field fresnel? "schlick"|"constant" how reflectance changes with the angle: up to white at grazing angles (Schlick's approximation), or not at all
----@field roughness? number|number[] perceptual roughness; 0 is smooth. Two: along u and across it
+---@field roughness? number|number[] perceptual roughness; 0 is smooth. Two: along u and across it, for brushed metal
 ---@field multiple_scattering? boolean whether light that facets reflect to each other is kept; false loses energy at high roughness, as many programs do
 ---@field name? string for messages
 
@@ -366,6 +366,37 @@ function tessera.glass(keys) end
 ---@param keys? tessera.PlasticKeys
 ---@return tessera.Material
 function tessera.plastic(keys) end
+
+-- @api metallic_roughness
+---@class tessera.MetallicRoughnessKeys
+---@field base_color? tessera.Color|tessera.Texture colour of the metal, of what is below the gloss, and of what is seen through it
+---@field metallic? number how much of it is a metal
+---@field roughness? number perceptual roughness; 0 is smooth
+---@field metallic_roughness? tessera.Texture multiplies both: roughness in green, metal in blue, linear
+---@field normal? tessera.Texture small bumps: directions in the frame of u, of what is up on the image, and of the normal, from -1 to 1 as linear numbers from 0 to 1
+---@field normal_scale? number how strong they are
+---@field emissive? tessera.Color|tessera.Texture radiance that it gives off by itself
+---@field ior? number index of refraction of what is no metal
+---@field specular? number strength of the reflection of what is no metal
+---@field specular_color? tessera.Color its colour, straight on
+---@field transmission? number the share of light that gets through what is no metal, tinted by base_color
+---@field volume? boolean whether the surface is closed and full, and so refracts; otherwise it is a thin wall
+---@field attenuation_color? tessera.Color what is left of white light inside after attenuation_distance
+---@field attenuation_distance? number see there
+---@field clearcoat? number the share of it that a coat of varnish covers
+---@field clearcoat_roughness? number perceptual roughness of the coat
+---@field clearcoat_normal? tessera.Texture bumps of the coat, which does not have those of normal
+---@field clearcoat_normal_scale? number how strong they are
+---@field sheen_color? tessera.Color colour of fibres on top, such as those of velvet
+---@field sheen_roughness? number their perceptual roughness
+---@field anisotropy? number how much reflections are stretched
+---@field anisotropy_rotation? number along which direction, counter-clockwise from that of u
+---@field name? string for messages
+
+---The material of glTF, by glTF's names and with its defaults: a metal, or a dielectric with light scattered below its gloss or let through, or a mixture, perhaps under fibres, perhaps under a coat of varnish; on both sides. raycast and whitted draw it diffuse in its base colour. Textures that hold numbers need color_space = "linear".
+---@param keys? tessera.MetallicRoughnessKeys
+---@return tessera.Material
+function tessera.metallic_roughness(keys) end
 
 -- @api emitter
 ---@class tessera.EmitterKeys
@@ -444,6 +475,7 @@ function tessera.noise(keys) end
 ---@field file string the file
 ---@field color_space? "srgb"|"linear" how its numbers are coded
 ---@field wrap? tessera.Wrap|tessera.Wrap[] what lies beyond its edges in u and v
+---@field filter? "bilinear"|"trilinear" how it is interpolated
 ---@field name? string for messages
 
 ---A picture file: PNG, JPEG or Radiance HDR. Its first row lies at v = 0, as in glTF.

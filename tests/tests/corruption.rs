@@ -55,7 +55,7 @@ async fn flaky_node(address: SocketAddr, keys: &Path) {
             ToNode::Probe { job, cells, .. } => FromNode::Probed { job, cells: cells.iter().map(|(cell, _)| (*cell, 1e-6)).collect() },
             ToNode::Render { job, lease, rect, .. } => {
                 let (bytes, hash) = flipped(rect);
-                let header = PartHeader { job, lease, frame: pictured.unwrap(), seconds: 1e-3, hash };
+                let header = PartHeader { job, lease, frame: pictured.unwrap(), seconds: 1e-3, hash, invalid_samples: 0 };
                 let mut stream = connection.open_uni().await.unwrap();
                 wire::write(&mut stream, &header, PART_HEADER_BYTES).await.unwrap();
                 stream.write_all(&bytes).await.unwrap();

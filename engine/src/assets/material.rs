@@ -2,6 +2,8 @@
 //!
 //! Textures are indices into [`super::LoadedModel::textures`]; each multiplies the factor beside it.
 
+use crate::description;
+
 /// The surface of a mesh. Vertex colours multiply its base colour.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelMaterial {
@@ -208,5 +210,53 @@ impl ModelMaterial {
     /// Whether its look depends on the direction of tangents.
     pub fn needs_tangents(&self) -> bool {
         self.normal.is_some() || self.anisotropy.is_some() || self.clearcoat.is_some_and(|coat| coat.normal.is_some())
+    }
+}
+
+impl From<&description::MetallicRoughness> for ModelMaterial {
+    /// With the description's textures.
+    fn from(from: &description::MetallicRoughness) -> Self {
+        let texture = |id: Option<description::TextureId>| id.map(|id| id as usize);
+        let bumps = |bumps: &description::Bumps| NormalMap { texture: bumps.texture as usize, scale: bumps.scale };
+        let [r, g, b] = from.base_color;
+        let (specular, sheen, coat) = (from.specular, from.sheen_color, from.clearcoat);
+        Self {
+            base_color: [r, g, b, 1.0],
+            base_color_texture: texture(from.base_color_texture),
+            metallic: from.metallic,
+            roughness: from.roughness,
+            metallic_roughness_texture: texture(from.metallic_roughness_texture),
+            normal: from.normal.as_ref().map(bumps),
+            emission: ModelEmission { radiance: from.emissive, texture: texture(from.emissive_texture) },
+            double_sided: true,
+            ior: from.ior,
+            specular: Specular { factor: specular, color: from.specular_color, ..Specular::default() },
+            transmission: (from.transmission > 0.0).then_some(Transmission { factor: from.transmission, texture: None }),
+            volume: from.volume.as_ref().map(|volume| Volume {
+                thickness: 1.0,
+                thickness_texture: None,
+                attenuation_distance: volume.distance,
+                attenuation_color: volume.color,
+            }),
+            clearcoat: (coat > 0.0).then(|| Clearcoat {
+                factor: coat,
+                texture: None,
+                roughness: from.clearcoat_roughness,
+                roughness_texture: None,
+                normal: from.clearcoat_normal.as_ref().map(bumps),
+            }),
+            sheen: (sheen != [0.0; 3]).then_some(Sheen {
+                color: sheen,
+                color_texture: None,
+                roughness: from.sheen_roughness,
+                roughness_texture: None,
+            }),
+            anisotropy: (from.anisotropy > 0.0).then_some(Anisotropy {
+                strength: from.anisotropy,
+                rotation: from.anisotropy_rotation,
+                texture: None,
+            }),
+            ..Self::new("of the scene")
+        }
     }
 }

@@ -118,7 +118,7 @@ impl Library {
                 image
             }
         };
-        self.textures.push(Texture::Image { image, wrap: [map.wrap; 2], coordinates: Coordinates::default() });
+        self.textures.push(Texture::Image { image, pyramid: None, wrap: [map.wrap; 2], coordinates: Coordinates::default() });
         Ok(self.textures.len() - 1)
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Medium, Rgb, TextureId};
+use super::{Medium, MetallicRoughness, Rgb, TextureId};
 
 /// How a surface answers to light.
 ///
@@ -81,9 +81,24 @@ pub enum Material {
         /// What fills the inside.
         interior: Medium,
     },
+    /// As surfaces of glTF files.
+    MetallicRoughness(Box<MetallicRoughness>),
 }
 
 impl Material {
+    /// All textures that it names.
+    pub fn textures_mut(&mut self) -> impl Iterator<Item = &mut TextureId> {
+        let (one, several) = match self {
+            Self::Diffuse { texture, .. }
+            | Self::RoughDiffuse { texture, .. }
+            | Self::Plastic { texture, .. }
+            | Self::Emitter { texture, .. } => (texture.as_mut(), None),
+            Self::MetallicRoughness(model) => (None, Some(model.textures_mut())),
+            Self::Mirror { .. } | Self::Metal { .. } | Self::Glass { .. } | Self::Boundary { .. } => (None, None),
+        };
+        one.into_iter().chain(several.into_iter().flatten())
+    }
+
     /// Smooth glass in empty space, with nothing inside.
     pub fn smooth_glass(ior: f64, transmittance: Rgb) -> Self {
         Self::Glass { ior, reflectance: [1.0; 3], transmittance, roughness: 0.0, multiple_scattering: true, interior: None, priority: 0 }

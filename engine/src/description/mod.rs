@@ -12,6 +12,7 @@ mod frame;
 mod light;
 mod material;
 mod medium;
+mod metallic_roughness;
 mod object;
 mod render;
 mod source;
@@ -26,10 +27,11 @@ pub use frame::{Frame, FrameHash, Scene};
 pub use light::{Falloff, Light};
 pub use material::{Fresnel, Material};
 pub use medium::Medium;
+pub use metallic_roughness::{Absorption, Bumps, MetallicRoughness};
 pub use object::{Group, Matrix, Model, ModelFormat, Object, ObjectKind, Shape};
 pub use render::Render;
 pub use source::{Source, SourceId, Sources};
-pub use texture::{ColorSpace, Texture, TextureId, Wrap};
+pub use texture::{ColorSpace, Texture, TextureFilter, TextureId, Wrap};
 
 /// A linear Rec. 709 colour; components are finite and, unless a docstring says otherwise, not negative.
 pub type Rgb = [f32; 3];

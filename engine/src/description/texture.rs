@@ -43,7 +43,7 @@ pub enum Texture {
         /// Chooses the pattern.
         seed: u64,
     },
-    /// An image file (PNG, JPEG or Radiance HDR), bilinearly interpolated; its first row lies at v = 0 (glTF's convention).
+    /// An image file (PNG, JPEG or Radiance HDR); its first row lies at v = 0 (glTF's convention).
     Image {
         /// The file.
         file: AssetId,
@@ -51,6 +51,8 @@ pub enum Texture {
         color_space: ColorSpace,
         /// What lies beyond u in [0, 1] and v in [0, 1].
         wrap: [Wrap; 2],
+        /// What is between its pixels, and where they are smaller than the film's.
+        filter: TextureFilter,
         /// Where the script made it.
         #[serde(skip)]
         source: SourceId,
@@ -64,6 +66,16 @@ pub enum ColorSpace {
     Srgb,
     /// The numbers are linear.
     Linear,
+}
+
+/// How an image is interpolated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum TextureFilter {
+    /// Between four pixels, however many lie within one of the film's: samples find their mean.
+    #[default]
+    Bilinear,
+    /// Also between two smaller copies of the image, whose pixels are as large as the film's.
+    Trilinear,
 }
 
 /// What lies beyond the edge of an image.

@@ -94,7 +94,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                 found += walk.throughput * found::shining(scene, &surface, emission, walk.ray.direction, None);
             }
             let mut room = None;
-            let Some((bsdf, turn)) = path::bsdf(&scene, material, &surface, walk.before::<MEDIA>(), &mut room) else {
+            let Some((bsdf, turn)) = path::bsdf(&scene, material, &surface, walk.ray.direction, walk.before::<MEDIA>(), &mut room) else {
                 walk.inside = walk.beyond::<MEDIA>(&surface, walk.ray.direction);
                 walk.ray = surface.spawn(walk.ray.direction);
                 continue;

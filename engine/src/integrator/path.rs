@@ -2,7 +2,12 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Integrator, RayCounts, chain::Chain, found, shading::Shading};
+use super::{
+    Integrator, RayCounts,
+    chain::Chain,
+    found,
+    shading::{self, Shading},
+};
 use crate::{
     light::{Arriving, Caustics, Vertex},
     material::{Bsdf, Material, Medium, MetallicRoughness, Recipe, Scattered, Travel},
@@ -201,7 +206,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             *radiance += walk.throughput * found::shining(scene, surface, emission, direction, walk.last.as_ref()) * self.share(walk);
         }
         let mut room = None;
-        let Some((bsdf, turn)) = bsdf(&scene, material, surface, walk.before::<MEDIA>(), &mut room) else { return Next::Passes };
+        let Some((bsdf, turn)) = bsdf(&scene, material, surface, direction, walk.before::<MEDIA>(), &mut room) else { return Next::Passes };
         if walk.depth == self.max_depth || matches!(material.recipe, Recipe::Nothing) {
             return Next::Ends;
         }
@@ -363,12 +368,13 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
     }
 }
 
-/// How a surface scatters light at a point, and the turn of its tangent; `None` if it cannot be seen there. `room` is where a large model is put, so that small ones stay small.
+/// How a surface scatters light at a point that a ray along `direction` meets, and the turn of its tangent; `None` if it cannot be seen there. `room` is where a large model is put, so that small ones stay small.
 #[inline(always)]
 pub(super) fn bsdf<'s: 'r, 'r>(
     scene: &'s Scene,
     material: &'s Material,
     surface: &Surface,
+    direction: DVec3,
     inside: &Inside,
     room: &'r mut Option<MetallicRoughness<'s>>,
 ) -> Option<(Bsdf<'r>, DVec2)> {
@@ -377,7 +383,10 @@ pub(super) fn bsdf<'s: 'r, 'r>(
         Recipe::Glass(glass) => Bsdf::Dielectric(glass.beside(inside.outside_of(scene, surface)?)),
         Recipe::Model(model) => {
             let outside = if model.ior().is_some() { inside.outside_of(scene, surface)? } else { 1.0 };
-            let (model, turn) = model.at(outside, &scene.textures, surface);
+            let (mut model, turn) = model.at(outside, &scene.textures, surface);
+            if let Some(normal) = shading::coat_normal(turn, scene, material, surface, direction) {
+                model = model.with_coat_normal(normal);
+            }
             return Some((Bsdf::MetallicRoughness(room.insert(model)), turn));
         }
         recipe => recipe.bsdf(material, &scene.textures, surface),

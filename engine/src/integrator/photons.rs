@@ -85,7 +85,7 @@ impl Batch<'_> {
                 return None;
             }
             let mut room = None;
-            let (bsdf, turn) = path::bsdf(&scene, material, &surface, &inside, &mut room)?;
+            let (bsdf, turn) = path::bsdf(&scene, material, &surface, ray.direction, &inside, &mut room)?;
             let shading = Shading::new(bsdf, turn, &scene, material, &surface, ray.direction);
             if !shading.bsdf.is_specular() {
                 return caster.map(|caster| Photon { point: surface.point, towards: -ray.direction, flux, caster, begin });

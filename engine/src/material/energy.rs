@@ -310,6 +310,13 @@ impl Interfaces {
 impl Fill<3> for Interfaces {
     const FALLING: [bool; 3] = [false, true, true];
 
+    /// Where total reflection begins, if both indices are so near that this is a grazing angle: what leaves there leaves along the surface, and is masked.
+    fn bend(&self) -> Option<f64> {
+        const NEAR: f64 = 1.0 / 1.03;
+        let ratio = self.eta.min(1.0 / self.eta);
+        (ratio > NEAR && ratio < 1.0).then(|| (1.0 - ratio * ratio).sqrt())
+    }
+
     fn value(&self, ggx: &Ggx, o: DVec3) -> [f64; 3] {
         let [reflected, outside, inside] = self.normals.mean_of_cells(ggx, o, |m, spread| Self::both(ggx, o, m, spread, self.eta));
         [reflected - (1.0 - outside) * fresnel(o.z, self.eta), outside, inside]

@@ -32,12 +32,13 @@ pub enum Ideal {
 }
 
 impl Ideal {
-    /// Metals become mirrors of what they reflect straight on, plastic becomes its base, and what only shines is black.
+    /// Metals become mirrors of what they reflect straight on, plastic and glTF's model become their base, and what only shines is black.
     pub fn of(material: &Material) -> Self {
         match material {
             Material::Diffuse { reflectance, texture }
             | Material::RoughDiffuse { reflectance, texture, .. }
             | Material::Plastic { reflectance, texture, .. } => Self::Diffuse { reflectance: rgb(*reflectance), texture: *texture },
+            Material::MetallicRoughness(model) => Self::Diffuse { reflectance: rgb(model.base_color), texture: model.base_color_texture },
             Material::Mirror { reflectance } => Self::Mirror { reflectance: rgb(*reflectance) },
             Material::Metal { fresnel, .. } => Self::Mirror { reflectance: straight_on(fresnel) },
             Material::Glass { ior, reflectance, transmittance, .. } => {

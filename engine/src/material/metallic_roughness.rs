@@ -17,6 +17,7 @@ use super::{
     refractive::Dielectric,
     sheen::{self, SheenAlbedo},
 };
+use crate::math::orthonormal_basis;
 
 /// Parameters at one point, with the names and ranges of glTF.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +94,8 @@ pub struct MetallicRoughness<'a> {
     specular: Gloss,
     coat: Gloss,
     clearcoat: f64,
+    /// The coat's own axes in the local frame, if its normal is another one; its z is the normal.
+    coat_axes: Option<[DVec3; 3]>,
     sheen_color: DVec3,
     sheen_roughness: f64,
     /// Whether the inside differs from the outside; else the surface looks alike from both sides.
@@ -146,11 +149,28 @@ impl<'a> MetallicRoughness<'a> {
             specular,
             coat,
             clearcoat: unit(p.clearcoat),
+            coat_axes: None,
             sheen_color: if tables.sheen.is_some() { p.sheen_color.clamp(DVec3::ZERO, DVec3::ONE) } else { DVec3::ZERO },
             sheen_roughness: p.sheen_roughness,
             volume,
             diffuse_norm: (1.0 - specular.mix(1.0 - missing, five)).max(f64::MIN_POSITIVE),
             white_norm: missing,
+        }
+    }
+
+    /// With a coat of another unit normal in the local frame, as seen from the viewer's side: z is above 0. Cosines of what the coat reflects are those with its own normal
+    /// (`KHR_materials_clearcoat`).
+    pub fn with_coat_normal(self, normal: DVec3) -> Self {
+        let (x, y) = orthonormal_basis(normal);
+        Self { coat_axes: Some([x, y, normal]), ..self }
+    }
+
+    /// A direction as the coat sees it.
+    #[inline(always)]
+    fn to_coat(&self, w: DVec3) -> DVec3 {
+        match self.coat_axes {
+            None => w,
+            Some([x, y, z]) => DVec3::new(x.dot(w), y.dot(w), z.dot(w)),
         }
     }
 
@@ -210,7 +230,8 @@ impl<'a> MetallicRoughness<'a> {
     #[inline]
     fn seen(&self, w: DVec3) -> Seen {
         let bare = self.volume && w.z < 0.0;
-        let coat = if bare || self.clearcoat == 0.0 { 0.0 } else { self.clearcoat * self.coat.albedo(self.tables.facets, w)[0] };
+        let coat =
+            if bare || self.clearcoat == 0.0 { 0.0 } else { self.clearcoat * self.coat.albedo(self.tables.facets, self.to_coat(w))[0] };
         let fibres = match self.tables.sheen {
             Some(table) if !bare && self.sheen_color != DVec3::ZERO => table.at(self.sheen_roughness, w.z),
             _ => 0.0,
@@ -284,7 +305,7 @@ impl<'a> MetallicRoughness<'a> {
             THIN | THIN_DIFFUSE => nothing,
             _ if !reflected => nothing,
             COAT if self.volume && wo.z < 0.0 => nothing,
-            COAT => self.coat.evaluate(wo, wi, |fresnel| fresnel),
+            COAT => self.evaluate_coat(wo, wi),
             SHEEN if self.volume && wo.z < 0.0 => nothing,
             SHEEN => {
                 // glTF's fibres reflect more than they get at the last grazing angles; there they are dimmed, alike for both directions.
@@ -307,12 +328,34 @@ impl<'a> MetallicRoughness<'a> {
         match lobe {
             GLASS => self.glass.sample(wo, pick, u),
             METAL => self.metal.sample(wo, pick, u),
-            COAT => self.coat.sample(wo, u, |fresnel| fresnel),
+            COAT => self.sample_coat(wo, u),
             SPECULAR => self.specular.sample(wo, u, |fresnel| fresnel),
             THIN => self.specular.sample(wo, u, |fresnel| self.base_color * (1.0 - fresnel.max_element())).map(through),
             THIN_DIFFUSE => Some(through(Scattered::reflected(flat(), DVec3::ZERO, 0.0))),
             _ => Some(Scattered::reflected(flat(), DVec3::ZERO, 0.0)),
         }
+    }
+}
+
+impl MetallicRoughness<'_> {
+    /// What the coat reflects from one direction of the outside to another, times the cosine with its normal; nothing where it is seen from behind.
+    #[inline(always)]
+    fn evaluate_coat(&self, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
+        let (o, i) = (self.to_coat(wo), self.to_coat(wi));
+        if self.coat_axes.is_some() && !(o.z > 0.0 && i.z > 0.0) {
+            return (DVec3::ZERO, 0.0);
+        }
+        self.coat.evaluate(o, i, |fresnel| fresnel)
+    }
+
+    /// A direction in which the coat reflects, where that leads to the outside.
+    #[inline(always)]
+    fn sample_coat(&self, wo: DVec3, u: DVec2) -> Option<Scattered> {
+        let o = self.to_coat(wo);
+        let Some([x, y, z]) = self.coat_axes else { return self.coat.sample(o, u, |fresnel| fresnel) };
+        let s = self.coat.sample(o, u, |fresnel| fresnel).filter(|_| o.z > 0.0)?;
+        let wi = x * s.wi.x + y * s.wi.y + z * s.wi.z;
+        (wi.z > 0.0).then_some(Scattered { wi, ..s })
     }
 }
 

@@ -35,7 +35,7 @@ pub use self::{
     medium::{Medium, Travel},
     metallic_roughness::MetallicRoughness,
     model::ModelSurface,
-    normal::NormalMap,
+    normal::{CoatNormal, NormalMap},
     recipe::{Glass, Recipe},
     tables::SharedTables,
 };
@@ -67,8 +67,12 @@ pub struct Material {
     pub color_from_vertices: bool,
     /// Bumps.
     pub normal_map: Option<NormalMap>,
+    /// Which way its clear coat faces.
+    pub coat_normal: CoatNormal,
     /// The coordinates along which tangents lie, if it asks for tangents.
     pub tangents: Option<Coordinates>,
+    /// Whether one of its textures asks what a pixel of the film covers.
+    pub filtered: bool,
     /// All that a model's file says of it.
     pub model: Option<Arc<ModelSurface>>,
 }
@@ -96,8 +100,12 @@ impl Emission {
 }
 
 impl Material {
-    /// Prepares a material of the description; texture indices stay what they are. Without `tables`, for those to whom light is as simple as to [`Ideal`].
-    pub fn compile(material: &description::Material, tables: Option<&mut SharedTables>) -> Self {
+    /// Prepares a material of the description; texture indices stay what they are, of these compiled textures. Without `tables`, for those to whom light is as simple as to
+    /// [`Ideal`].
+    pub fn compile(material: &description::Material, textures: &[Texture], tables: Option<&mut SharedTables>) -> Self {
+        if let description::Material::MetallicRoughness(model) = material {
+            return Self::from_model(&ModelMaterial::from(&**model), textures, 0, tables);
+        }
         let emission = match material {
             description::Material::Emitter { radiance, texture, two_sided } if radiance.iter().any(|x| *x > 0.0) => {
                 Some(Emission::even(rgb(*radiance), *texture, *two_sided))
@@ -105,6 +113,7 @@ impl Material {
             _ => None,
         };
         let (ideal, recipe) = (Ideal::of(material), tables.map_or(Recipe::Nothing, |tables| Recipe::of(material, tables)));
+        let texture = ideal.texture().or(emission.and_then(|emission| emission.texture));
         Self {
             ideal,
             recipe,
@@ -115,7 +124,9 @@ impl Material {
             double_sided: true,
             color_from_vertices: false,
             normal_map: None,
-            tangents: None,
+            coat_normal: CoatNormal::Base,
+            tangents: is_brushed(material).then(Coordinates::default),
+            filtered: texture.and_then(|texture| textures.get(texture as usize)).is_some_and(Texture::is_filtered),
             model: None,
         }
     }
@@ -152,7 +163,9 @@ impl Material {
             double_sided: material.double_sided,
             color_from_vertices: true,
             normal_map: material.normal.as_ref().filter(|_| lit).map(|map| NormalMap::new(map, first_texture)),
+            coat_normal: if lit { CoatNormal::of(material, first_texture) } else { CoatNormal::Base },
             tangents: tangents(material, textures).filter(|_| lit),
+            filtered: material.textures().any(|texture| textures.get(texture).is_some_and(Texture::is_filtered)),
             model,
         }
     }
@@ -181,6 +194,11 @@ impl Material {
     pub fn is_masked(&self) -> bool {
         self.alpha_cutoff.is_some()
     }
+}
+
+/// Whether its look depends on the direction of tangents.
+fn is_brushed(material: &description::Material) -> bool {
+    matches!(material, description::Material::Metal { roughness: [along, across], .. } if along != across)
 }
 
 /// The coordinates of the first texture that tangents matter to; the mesh's first where none does.

@@ -107,12 +107,6 @@ impl ModelSurface {
         (point, direction)
     }
 
-    /// What of a file's material path tracing does not draw, though it is read.
-    pub fn undrawn_by_paths(material: &ModelMaterial) -> impl Iterator<Item = &'static str> {
-        let own_bumps = material.clearcoat.is_some_and(|coat| coat.normal.is_some());
-        own_bumps.then_some("the normal map of its clear coat is not modelled; the coat is as bumpy as the base").into_iter()
-    }
-
     /// What of it simpler integrators do not draw.
     pub fn undrawn(material: &ModelMaterial) -> impl Iterator<Item = &'static str> {
         let metal = material.metallic > 0.0;

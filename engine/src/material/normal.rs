@@ -28,3 +28,26 @@ impl NormalMap {
         normal.try_normalize()
     }
 }
+
+/// Which way a clear coat faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum CoatNormal {
+    /// As the base does.
+    #[default]
+    Base,
+    /// As the mesh does, whatever bumps the base has.
+    Mesh,
+    /// By bumps of its own.
+    Mapped(NormalMap),
+}
+
+impl CoatNormal {
+    /// Of a material whose textures begin at `first_texture` of the scene's (`KHR_materials_clearcoat`: without a map of its own the coat has no bumps).
+    pub fn of(material: &assets::ModelMaterial, first_texture: u32) -> Self {
+        match material.clearcoat.map(|coat| coat.normal) {
+            Some(Some(map)) => Self::Mapped(NormalMap::new(&map, first_texture)),
+            Some(None) if material.normal.is_some() => Self::Mesh,
+            _ => Self::Base,
+        }
+    }
+}

@@ -161,7 +161,8 @@ impl Recipe {
                 let albedo = tables.fixed_dielectric(*ior, alpha);
                 Self::Plastic { reflectance: rgb(*reflectance), texture: *texture, alpha, albedo }
             }
-            Description::Emitter { .. } => Self::Nothing,
+            // The model is told by [`Self::of_model`].
+            Description::Emitter { .. } | Description::MetallicRoughness(_) => Self::Nothing,
             Description::Boundary { interior } => Self::Boundary { interior: Medium::compile(interior) },
         }
     }

@@ -41,10 +41,12 @@ enum Rows {
 ///
 /// Along a row, nodes are even in the mean of the cosine and of the fourth root of `cos / (cos + tilt)`, where `tilt = alpha sin` as the surface
 /// sees it. Masking depends on little but the latter, which resolves the last grazing angles of the smoothest surface, at which albedos are steepest;
-/// the cosine resolves where total reflection begins. Of the nodes, those are computed between which functions bend.
+/// the cosine resolves where total reflection begins, and where that is near grazing angles, a third part, which rises there within the tilt. Of the nodes, those are computed between which functions bend.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table<const K: usize> {
     rows: Rows,
+    /// The cosine about which functions bend most, if nodes are denser there.
+    bend: Option<f64>,
     nodes: Vec<[[f64; K]; NODES]>,
     /// Means over the cosine-weighted hemisphere.
     means: Vec<[f64; K]>,
@@ -56,6 +58,10 @@ pub trait Fill<const K: usize> {
     fn value(&self, ggx: &Ggx, o: DVec3) -> [f64; K];
     /// What the means are taken of, from an interpolated value and the cosine; it must fade away from the surface like masking.
     fn meaning(&self, value: [f64; K], cos: f64) -> [f64; K];
+    /// The cosine about which the functions bend within the tilt of facets, if that is near to grazing angles.
+    fn bend(&self) -> Option<f64> {
+        None
+    }
     /// Which means fall like `alpha` for smooth surfaces.
     const FALLING: [bool; K];
 }
@@ -65,12 +71,12 @@ impl<const K: usize> Table<K> {
     pub fn fixed<F: Fill<K>>(ggx: &Ggx, fill: &F) -> Self {
         let alpha = ggx.alpha();
         if alpha.x == alpha.y {
-            let mut table = Self { rows: Rows::Fixed, nodes: vec![row(ggx, DVec2::X, fill)], means: Vec::new() };
+            let mut table = Self { rows: Rows::Fixed, bend: fill.bend(), nodes: vec![row(ggx, DVec2::X, fill)], means: Vec::new() };
             table.means = vec![table.mean_of(fill, alpha.x, 0.0)];
             return table;
         }
         let rows = (0..AZIMUTHS).step_by(EVERY).map(|at| row(ggx, azimuth(alpha, grid(at, AZIMUTHS)), fill)).collect();
-        let mut table = Self { rows: Rows::Azimuth(alpha), nodes: denser(rows), means: Vec::new() };
+        let mut table = Self { rows: Rows::Azimuth(alpha), bend: fill.bend(), nodes: denser(rows), means: Vec::new() };
         table.means = vec![table.mean_of_azimuths(fill, alpha)];
         table
     }
@@ -86,7 +92,7 @@ impl<const K: usize> Table<K> {
         for (at, row) in nodes.iter_mut().enumerate().take(EVERY).skip(1) {
             *row = exact(at);
         }
-        let mut table = Self { rows: Rows::Roughness, nodes, means: Vec::new() };
+        let mut table = Self { rows: Rows::Roughness, bend: fill.bend(), nodes, means: Vec::new() };
         let means = |at: usize| {
             let root = at as f64 / MEANS as f64;
             let alpha = squared(root * root);
@@ -115,7 +121,7 @@ impl<const K: usize> Table<K> {
             Rows::Roughness if alpha.x == alpha.y => roughness_row(alpha.x),
             Rows::Roughness => roughness_row((0.5 * alpha.length_squared()).sqrt()),
         };
-        self.interpolate(row, place(cos, tilt))
+        self.interpolate(row, place(cos, tilt, self.bend))
     }
 
     /// Means over the cosine-weighted hemisphere of what [`Self::at`] tells; `F` filled the table.
@@ -150,12 +156,12 @@ impl<const K: usize> Table<K> {
         let mut sum = [0.0; K];
         let mut low = 0.0;
         for node in 1..NODES {
-            let high = cosine_at(alpha, grid(node, NODES));
+            let high = cosine_at(alpha, grid(node, NODES), self.bend);
             for (at, weight) in GAUSS {
                 // Dense at the lower end: where a smooth surface begins to be seen as one, one cell holds many cosines.
                 let cos = low + (high - low) * (at * at);
                 let tilt = alpha * (1.0 - cos * cos).max(0.0).sqrt();
-                let value = fill.meaning(self.interpolate(row, place(cos, tilt)), cos);
+                let value = fill.meaning(self.interpolate(row, place(cos, tilt, self.bend)), cos);
                 let weight = weight * 4.0 * at * (high - low) * cos;
                 sum = std::array::from_fn(|k| sum[k] + value[k] * weight);
             }
@@ -213,8 +219,17 @@ fn squared(root: f64) -> f64 {
 
 /// Where in a row a direction lies, from 0 along the surface to 1 straight on.
 #[inline(always)]
-fn place(cos: f64, tilt: f64) -> f64 {
-    0.5 * (cos + share(cos, tilt).sqrt().sqrt())
+fn place(cos: f64, tilt: f64, bend: Option<f64>) -> f64 {
+    let even = cos + share(cos, tilt).sqrt().sqrt();
+    match bend {
+        None => 0.5 * even,
+        Some(bend) => {
+            // Rises from 0 to 1, fastest within the tilt; as a third part only where the tilt leaves the bend sharp.
+            let beyond = (cos - bend) / ((cos - bend).abs() + 4.0 * tilt).max(f64::MIN_POSITIVE);
+            let weight = bend / (bend + tilt);
+            (even + weight * 0.5 * (1.0 + beyond)) / (2.0 + weight)
+        }
+    }
 }
 
 /// The cosine whose share in `cos + alpha sin` is `root^4`.
@@ -225,8 +240,10 @@ fn cosine(alpha: f64, root: f64) -> f64 {
 }
 
 /// The cosine at a [`place`].
-fn cosine_at(alpha: f64, place: f64) -> f64 {
-    cosine(alpha, solve(|root| 0.5 * (cosine(alpha, root) + root) - place))
+fn cosine_at(alpha: f64, at: f64, bend: Option<f64>) -> f64 {
+    let Some(bend) = bend else { return cosine(alpha, solve(|root| 0.5 * (cosine(alpha, root) + root) - at)) };
+    let of = |cos: f64| place(cos, alpha * (1.0 - cos * cos).max(0.0).sqrt(), Some(bend));
+    cosine(alpha, solve(|root| of(cosine(alpha, root)) - at))
 }
 
 /// Where in the first quarter an azimuth lies, from 0 along y to 1 along x: the mean of the shares of x in the direction and in the tilt that the
@@ -291,7 +308,7 @@ fn denser<const K: usize>(rows: Vec<[[f64; K]; NODES]>) -> Vec<[[f64; K]; NODES]
 fn row<const K: usize, F: Fill<K>>(ggx: &Ggx, azimuth: DVec2, fill: &F) -> [[f64; K]; NODES] {
     let alpha = (ggx.alpha() * azimuth).length();
     let value = |node: usize| {
-        let cos = cosine_at(alpha, grid(node, NODES));
+        let cos = cosine_at(alpha, grid(node, NODES), fill.bend());
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         fill.value(ggx, DVec3::new(azimuth.x * sin, azimuth.y * sin, cos))
     };
@@ -299,13 +316,13 @@ fn row<const K: usize, F: Fill<K>>(ggx: &Ggx, azimuth: DVec2, fill: &F) -> [[f64
     row[0] = value(0);
     for high in (STRIDE..NODES).step_by(STRIDE) {
         row[high] = value(high);
-        refine(&mut row, high - STRIDE, high, &value);
+        refine(&mut row, high - STRIDE, high, fill.bend().is_some(), &value);
     }
     row
 }
 
-/// Fills a row between two nodes, of which there is a power of two.
-fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, value: &impl Fn(usize) -> [f64; K]) {
+/// Fills a row between two nodes, of which there is a power of two; `all` of them, or where functions bend.
+fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, all: bool, value: &impl Fn(usize) -> [f64; K]) {
     let half = (high - low) / 2;
     if half == 0 {
         return;
@@ -313,9 +330,9 @@ fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, 
     let (a, middle, b) = (row[low], value(low + half), row[high]);
     row[low + half] = middle;
     let bend: [f64; K] = std::array::from_fn(|k| 0.5 * (a[k] + b[k]) - middle[k]);
-    if low < STRIDE || bend.iter().any(|bend| bend.abs() > STRAIGHT) {
-        refine(row, low, low + half, value);
-        refine(row, low + half, high, value);
+    if all || low < STRIDE || bend.iter().any(|bend| bend.abs() > STRAIGHT) {
+        refine(row, low, low + half, all, value);
+        refine(row, low + half, high, all, value);
         return;
     }
     // The parabola through the three, within their range.

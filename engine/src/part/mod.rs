@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 pub use canary::{CanaryError, canary, canary_hash};
 pub use counters::Counters;
 pub use pairwise::PairwiseSum;
-pub use render::{probe, render};
+pub use render::{prepared, probe, render};
 pub use rendered::{RenderedPart, WrongLength, hash_of_bytes};
 
 /// A rectangle of pixels.

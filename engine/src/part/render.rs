@@ -7,11 +7,19 @@ use glam::{DVec2, DVec3};
 use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange, aovs, spread::Spread};
 use crate::{
     description::{Aov, Render},
-    integrator::{Integrator, Path, Raycast, Whitted, caustics},
+    integrator::{self, Integrator, Path, Raycast, Whitted, caustics},
     sampling::Sampler,
     scene::{Scene, Tracer, Work},
     shape::Ray,
 };
+
+/// A scene with all that its parts have in common done, by all threads of the pool that the caller is in: else the first of its parts does it, and takes longer than it should.
+pub fn prepared(scene: Scene) -> Scene {
+    if matches!(scene.render, Render::Path { .. }) {
+        integrator::prepare(&scene);
+    }
+    scene
+}
 
 /// Renders the samples of a range in every pixel of a rectangle. A pixel is the mean of its samples, summed by [`PairwiseSum`]. A sample that is
 /// invalid (a component is negative or no finite number) counts as black, so that it cannot spoil the pixel, and is counted. What the frame tells beside

@@ -62,7 +62,7 @@ impl Scene {
         let textures = frame.scene.textures.iter().map(|t| texture(t, assets)).collect::<Result<Vec<_>>>()?;
         let mut tables = matches!(frame.render, Render::Path { .. }).then(SharedTables::default);
         let materials = frame.scene.materials.iter().enumerate();
-        let materials = materials.map(|(i, m)| material(i, m, textures.len(), tables.as_mut())).collect::<Result<Vec<_>>>()?;
+        let materials = materials.map(|(i, m)| material(i, m, &textures, tables.as_mut())).collect::<Result<Vec<_>>>()?;
         let medium = frame.scene.medium.as_ref();
         medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("the scene: {error}")))?;
         let medium = medium.and_then(Medium::compile);
@@ -212,25 +212,29 @@ fn texture(texture: &description::Texture, assets: &dyn AssetSource) -> Result<T
     Texture::compile(texture, assets).map_err(|error| CompileError::asset(source, error))
 }
 
-fn material(index: usize, material: &description::Material, textures: usize, tables: Option<&mut SharedTables>) -> Result<Material> {
-    use description::Material::{Boundary, Diffuse, Emitter, Glass, Metal, Mirror, Plastic, RoughDiffuse};
+fn material(index: usize, material: &description::Material, textures: &[Texture], tables: Option<&mut SharedTables>) -> Result<Material> {
+    use description::Material::{Boundary, Diffuse, Emitter, Glass, Metal, MetallicRoughness, Mirror, Plastic, RoughDiffuse};
     let wrong = |what: &str| Err(CompileError::new(SourceId::default(), format!("material {index}: {what}")));
-    let (colors, texture, roughness, ior, medium): (&[&Rgb], _, &[f64], _, _) = match material {
-        Diffuse { reflectance, texture } => (&[reflectance], *texture, &[], 1.0, None),
-        RoughDiffuse { reflectance, texture, roughness } => (&[reflectance], *texture, &[*roughness], 1.0, None),
-        Mirror { reflectance } => (&[reflectance], None, &[], 1.0, None),
+    let (colors, roughness, ior, medium): (&[&Rgb], &[f64], _, _) = match material {
+        Diffuse { reflectance, .. } => (&[reflectance], &[], 1.0, None),
+        RoughDiffuse { reflectance, roughness, .. } => (&[reflectance], &[*roughness], 1.0, None),
+        Mirror { reflectance } => (&[reflectance], &[], 1.0, None),
         Metal { fresnel, roughness, .. } => match fresnel {
-            Fresnel::Index { eta, k } => (&[eta, k], None, roughness, 1.0, None),
-            Fresnel::Schlick(color) | Fresnel::Constant(color) => (&[color], None, roughness, 1.0, None),
+            Fresnel::Index { eta, k } => (&[eta, k], roughness, 1.0, None),
+            Fresnel::Schlick(color) | Fresnel::Constant(color) => (&[color], roughness, 1.0, None),
         },
         Glass { ior, reflectance, transmittance, roughness, interior, .. } => {
-            (&[reflectance, transmittance], None, &[*roughness], *ior, interior.as_ref())
+            (&[reflectance, transmittance], &[*roughness], *ior, interior.as_ref())
         }
-        Plastic { reflectance, texture, ior, roughness } => (&[reflectance], *texture, &[*roughness], *ior, None),
-        Emitter { radiance, texture, .. } => (&[radiance], *texture, &[], 1.0, None),
-        Boundary { interior } => (&[], None, &[], 1.0, Some(interior)),
+        Plastic { reflectance, ior, roughness, .. } => (&[reflectance], &[*roughness], *ior, None),
+        Emitter { radiance, .. } => (&[radiance], &[], 1.0, None),
+        Boundary { interior } => (&[], &[], 1.0, Some(interior)),
+        MetallicRoughness(model) => match model.fault() {
+            Some(fault) => return wrong(fault),
+            None => (&[], &[], 1.0, None),
+        },
     };
-    if texture.is_some_and(|texture| texture as usize >= textures) {
+    if material.clone().textures_mut().any(|texture| *texture as usize >= textures.len()) {
         return wrong("it names a texture that does not exist");
     }
     if !(ior > 0.0 && ior.is_finite()) {
@@ -243,7 +247,7 @@ fn material(index: usize, material: &description::Material, textures: usize, tab
         return wrong("its colours must be finite and not negative");
     }
     medium.map_or(Ok(()), check_medium).map_err(|error| CompileError::new(SourceId::default(), format!("material {index}: {error}")))?;
-    Ok(Material::compile(material, tables))
+    Ok(Material::compile(material, textures, tables))
 }
 
 fn check_medium(medium: &description::Medium) -> std::result::Result<(), &'static str> {

@@ -142,7 +142,7 @@ fn mean(texture: &Texture, mesh: &Mesh, triangle: u32) -> DVec3 {
         for column in 0..2 * (STEPS - row) - 1 {
             let shift = if column % 2 == 0 { 1.0 / 3.0 } else { 2.0 / 3.0 };
             let (b, c) = ((f64::from(column / 2) + shift) / f64::from(STEPS), (f64::from(row) + shift) / f64::from(STEPS));
-            let [r, g, b, _] = texture.at(at([1.0 - b - c, b, c]));
+            let [r, g, b, _] = texture.at(at([1.0 - b - c, b, c]).into());
             sum += rgb([r, g, b]);
         }
     }

@@ -2,6 +2,7 @@
 
 mod casters;
 mod compile;
+mod directions;
 mod emitters;
 mod error;
 mod explain;

@@ -57,8 +57,8 @@ impl<'a> Placer<'a> {
             self.materials.push(Material::from_model(material, &loaded.textures, first_texture, self.tables.as_mut()));
         }
         self.textures.extend(loaded.textures);
-        let undrawn = undrawn(&loaded.materials, &loaded.meshes, self.tables.is_some());
-        for message in loaded.warnings.into_iter().chain(undrawn) {
+        let undrawn = self.tables.is_none().then(|| undrawn(&loaded.materials, &loaded.meshes));
+        for message in loaded.warnings.into_iter().chain(undrawn.into_iter().flatten()) {
             self.warn(source, message);
         }
         let materials = loaded.meshes.iter().map(|mesh| first_material + mesh.material as u32).collect();
@@ -93,18 +93,14 @@ fn placed_light(light: &ModelLight, to_world: &DAffine3, source: SourceId) -> de
     }
 }
 
-/// What is read of the materials that meshes have, but not drawn.
-fn undrawn(materials: &[ModelMaterial], meshes: &[assets::Mesh], by_paths: bool) -> Vec<String> {
+/// What is read of the materials that meshes have, but not drawn by those who do not follow all light.
+fn undrawn(materials: &[ModelMaterial], meshes: &[assets::Mesh]) -> Vec<String> {
     let mut used = vec![false; materials.len()];
     meshes.iter().for_each(|mesh| used[mesh.material] = true);
     let mut warnings = assets::Warnings::default();
     for (material, _) in materials.iter().zip(used).filter(|(_, used)| *used) {
         let mut warn = |text: &str| warnings.object("material", format!("{:?}", material.name), text);
-        if by_paths {
-            ModelSurface::undrawn_by_paths(material).for_each(&mut warn);
-        } else {
-            ModelSurface::undrawn(material).for_each(&mut warn);
-        }
+        ModelSurface::undrawn(material).for_each(&mut warn);
     }
     warnings.into_texts()
 }

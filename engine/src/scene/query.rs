@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     Scene, Surface,
+    directions::Directions,
     geometry::{Instance, LocalShape, Placed, kind},
     outlined::Outlined,
     surface::{Crossing, Thing, in_world},
@@ -271,7 +272,7 @@ impl Scene {
         }
         let Some(cutoff) = material.alpha_cutoff else { return true };
         let mesh = &self.geometry.meshes[placed.shape.mesh as usize];
-        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].at(mesh.uvs_at(hit))[3]);
+        let texture = material.texture().map_or(1.0, |texture| self.textures[texture as usize].at(mesh.uvs_at(hit).into())[3]);
         let alpha = material.base_alpha * texture * mesh.color(hit)[3];
         let blends = material.blends && matches!(self.render, Render::Path { .. });
         if blends { f64::from(alpha) > chance(hit) } else { alpha >= cutoff }
@@ -285,7 +286,7 @@ impl Scene {
         }
         let geometry = &self.geometry;
         let index = (hit.reference & kind::INDEX) as usize;
-        Some(match hit.reference >> kind::SHIFT {
+        let surface = match hit.reference >> kind::SHIFT {
             kind::SPHERE => {
                 let sphere = &geometry.spheres[index];
                 let bit = if geometry.list.is_some() { 1 << index } else { 0 };
@@ -311,8 +312,14 @@ impl Scene {
                 in_world(other.shape.point(ray, hit.t, hit.part, textured), hit, other.material)
             }
             kind::TRANSFORMED => self.transformed_surface(ray, hit, index),
-            _ => self.mesh_surface(hit, index),
-        })
+            _ => return Some(self.mesh_surface(hit, index)),
+        };
+        let material = &self.materials[surface.material as usize];
+        if !(material.filtered || material.tangents.is_some()) {
+            return Some(surface);
+        }
+        let Directions { tangents, footprints } = self.directions(hit.reference, hit.part, surface.point, surface.ng);
+        Some(Surface { tangents, footprints, ..surface })
     }
 
     #[inline(always)]
@@ -355,6 +362,7 @@ impl Scene {
         let tangents = material.tangents.as_ref().map_or([DVec3::ZERO; 2], |coordinates| {
             mesh.tangents_at(&at, local.ns, coordinates).map(|tangent| transform.to_world.transform_vector3(tangent))
         });
+        let footprints = if material.filtered { self.footprints_on_mesh(&at, point, ng) } else { Default::default() };
         let error = transform.error(local.error, local.position, point);
         Surface {
             point,
@@ -365,6 +373,7 @@ impl Scene {
             uv,
             uv2,
             tangents,
+            footprints,
             color: mesh.color(&at),
             material: placed.material,
             object: hit.object,

@@ -3,7 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::{geometry::Placed, query::Hit};
-use crate::shape::{Point, Surface};
+use crate::{
+    shape::{Point, Surface},
+    texture::Footprint,
+};
 
 /// A surface that a ray crosses, for [`super::Scene::any`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -45,6 +48,7 @@ pub(super) fn in_world(point: Point, hit: &Hit, material: u32) -> Surface {
         uv,
         uv2: DVec2::ZERO,
         tangents: [DVec3::ZERO; 2],
+        footprints: [Footprint::default(); 2],
         color: [1.0; 4],
         material,
         object,

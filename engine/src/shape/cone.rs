@@ -1,7 +1,7 @@
 //! Cones, truncated cones and cylinders: one shape with two radii.
 
 use glam::{DVec2, DVec3};
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::{FRAC_1_PI, TAU};
 
 use super::{Bounds, Disc, Point, Ray};
 use crate::math::{UNIT, atan2, max_abs, orthonormal_basis};
@@ -222,5 +222,17 @@ impl Cone {
         let u = 0.5 + atan2(up.cross(front).dot(p), front.dot(p)) * (0.5 * FRAC_1_PI);
         let v = (self.axis.dot(p) / self.height).clamp(0.0, 1.0);
         DVec2::new(u, if self.forward { 1.0 - v } else { v })
+    }
+
+    /// How the position changes with u and with v at a place of a part; u leads nowhere at an apex.
+    pub fn along_uv(&self, position: DVec3, part: u32) -> [DVec3; 2] {
+        if part != SIDE {
+            return self.cap(part).along_uv();
+        }
+        let p = position - self.narrow;
+        let beside = p - self.axis * self.axis.dot(p);
+        let to_wide = self.axis * self.height + beside.normalize_or_zero() * (self.radii[1] - self.radii[0]);
+        let (up, along_v) = if self.forward { (self.axis, -to_wide) } else { (-self.axis, to_wide) };
+        [up.cross(beside) * TAU, along_v]
     }
 }

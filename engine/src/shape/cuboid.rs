@@ -80,4 +80,18 @@ impl Cuboid {
         };
         Point { position, error, normal, uv }
     }
+
+    /// How the position changes with u and with v on a face.
+    pub fn along_uv(&self, face: u32) -> [DVec3; 2] {
+        let DVec3 { x, y, z } = self.max - self.min;
+        let (right, up, front) = (DVec3::X * x, DVec3::Y * y, DVec3::Z * z);
+        match face {
+            0 => [front, -up],
+            1 => [-front, -up],
+            2 => [right, -front],
+            3 => [right, front],
+            4 => [-right, -up],
+            _ => [right, -up],
+        }
+    }
 }

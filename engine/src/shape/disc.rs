@@ -49,6 +49,12 @@ impl Disc {
         DVec2::new(0.5 + across.dot(right), 0.5 - across.dot(up))
     }
 
+    /// How the position changes with u and with v.
+    pub fn along_uv(&self) -> [DVec3; 2] {
+        let (right, up) = self.axes();
+        [right * (2.0 * self.radius), up * (-2.0 * self.radius)]
+    }
+
     fn flattened(&self, point: DVec3) -> DVec3 {
         point - self.normal * self.normal.dot(point - self.center)
     }

@@ -56,4 +56,13 @@ impl Other {
             Self::Cone(cone) => cone.point(ray, t, part, textured),
         }
     }
+
+    /// How the position changes with u and with v at a place of a part.
+    #[inline(never)]
+    pub fn along_uv(&self, position: DVec3, part: u32) -> [DVec3; 2] {
+        match self {
+            Self::Rectangle(rectangle) => rectangle.along_uv(),
+            Self::Cone(cone) => cone.along_uv(position, part),
+        }
+    }
 }

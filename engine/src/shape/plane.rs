@@ -70,4 +70,11 @@ impl Plane {
         let uv = DVec2::new(self.u_axis.dot(position), self.v_axis.dot(position)) + self.uv_offset;
         Point { position, error, normal: self.normal, uv }
     }
+
+    /// How the position changes with u and with v.
+    pub fn along_uv(&self) -> [DVec3; 2] {
+        // Within the plane, along lines of the same v, and of the same u.
+        let (along_u, along_v) = (self.v_axis.cross(self.normal), self.normal.cross(self.u_axis));
+        [along_u / self.u_axis.dot(along_u), along_v / self.v_axis.dot(along_v)]
+    }
 }

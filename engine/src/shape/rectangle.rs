@@ -82,4 +82,9 @@ impl Rectangle {
         let error = 16.0 * UNIT * (max_abs(position) + max_abs(self.corner) + self.reach);
         Point { position, error, normal: self.normal, uv: DVec2::new(a, 1.0 - b) }
     }
+
+    /// How the position changes with u and with v.
+    pub fn along_uv(&self) -> [DVec3; 2] {
+        [self.edges[0], -self.edges[1]]
+    }
 }

@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{Bounds, Point, Ray};
 use crate::math::{UNIT, acos, atan2, max_abs};
-use std::f64::consts::FRAC_1_PI;
+use std::f64::consts::{FRAC_1_PI, PI, TAU};
 
 /// The direction of a vector whose length is known but for rounding: one step of Newton's method for `1 / sqrt(x)` instead of a root and a division.
 #[inline(always)]
@@ -80,5 +80,15 @@ impl Sphere {
     /// south pole, so that an image is seen upright and unmirrored from outside.
     pub fn uv(normal: DVec3) -> DVec2 {
         DVec2::new(0.5 + atan2(normal.x, normal.z) * (0.5 * FRAC_1_PI), acos(normal.y.clamp(-1.0, 1.0)) * FRAC_1_PI)
+    }
+
+    /// How the position changes with u and with v where the unit normal is this; u leads nowhere at the poles.
+    pub fn along_uv(&self, normal: DVec3) -> [DVec3; 2] {
+        let from_axis = DVec2::new(normal.x, normal.z).length();
+        if from_axis == 0.0 {
+            return [DVec3::ZERO; 2];
+        }
+        let (east, height) = (DVec3::new(normal.z, 0.0, -normal.x), normal.y / from_axis);
+        [east * (TAU * self.radius), DVec3::new(normal.x * height, -from_axis, normal.z * height) * (PI * self.radius)]
     }
 }

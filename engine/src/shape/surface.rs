@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::Ray;
+use crate::texture::{Footprint, Uvs};
 
 /// The surface at a hit, in world coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,6 +24,8 @@ pub struct Surface {
     pub uv2: DVec2,
     /// Along u, and to the upper side of the image, of any length; 0 where the material does not ask for them or nothing tells them.
     pub tangents: [DVec3; 2],
+    /// What a pixel of the film covers of both sets of texture coordinates; 0 where the material does not ask for it.
+    pub footprints: [Footprint; 2],
     /// Vertex colour and opacity; 1 where there is none.
     pub color: [f32; 4],
     /// Index into `materials` of the scene.
@@ -36,10 +39,10 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// Both sets of texture coordinates.
+    /// Where on the surface textures are looked up.
     #[inline(always)]
-    pub fn uvs(&self) -> [DVec2; 2] {
-        [self.uv, self.uv2]
+    pub fn uvs(&self) -> Uvs {
+        Uvs { sets: [self.uv, self.uv2], footprints: self.footprints }
     }
 
     /// Tangent and bitangent as unit vectors that are perpendicular to a unit normal and to each other; of either handedness, as images may be mirrored.

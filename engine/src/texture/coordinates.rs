@@ -2,6 +2,7 @@
 
 use glam::{DAffine2, DVec2};
 
+use super::Footprint;
 use crate::math::sin_cos;
 
 /// Which texture coordinates of a surface a texture is looked up with, and how they are mapped before.
@@ -21,6 +22,16 @@ impl Coordinates {
         match &self.transform {
             None => uv,
             Some(transform) => transform.transform_point2(uv),
+        }
+    }
+
+    /// The footprint on the texture, of those in both sets of the surface.
+    #[inline]
+    pub fn footprint(&self, footprints: [Footprint; 2]) -> Footprint {
+        let Footprint(sides) = footprints[usize::from(self.second)];
+        match &self.transform {
+            None => Footprint(sides),
+            Some(transform) => Footprint(sides.map(|side| (transform.matrix2 * side.as_dvec2()).as_vec2())),
         }
     }
 }

@@ -65,6 +65,17 @@ impl Image {
         }
     }
 
+    /// Linear numbers, as many as there are pixels times channels.
+    pub(super) fn linear([width, height]: [u32; 2], channels: usize, samples: Vec<f32>) -> Self {
+        debug_assert_eq!(samples.len(), width as usize * height as usize * channels);
+        Self { width, height, channels, samples: Samples::Float { samples } }
+    }
+
+    /// Which of a pixel's numbers the file stores.
+    pub(super) fn channels(&self) -> &'static [usize] {
+        [&[0][..], &[0, 3], &[0, 1, 2], &[0, 1, 2, 3]][self.channels.clamp(1, 4) - 1]
+    }
+
     /// Columns and rows.
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height]

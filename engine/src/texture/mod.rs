@@ -1,8 +1,10 @@
 //! Textures, compiled: a colour for every uv.
 
 mod coordinates;
+mod footprint;
 mod image;
 mod noise;
+mod pyramid;
 mod srgb;
 mod wrap;
 #[cfg(test)]
@@ -14,11 +16,13 @@ use glam::DVec2;
 
 pub use self::{
     coordinates::{Coordinates, texture_transform},
+    footprint::{Footprint, Uvs},
     image::Image,
+    pyramid::Pyramid,
     srgb::srgb_to_linear,
 };
 
-use crate::description::{self, AssetError, AssetSource, Rgb, Wrap};
+use crate::description::{self, AssetError, AssetSource, Rgb, TextureFilter, Wrap};
 
 /// A texture that is ready to be looked up. Clones share the image.
 #[derive(Clone, Debug)]
@@ -56,10 +60,12 @@ pub enum Texture {
         /// Chooses the pattern.
         seed: u64,
     },
-    /// An image, bilinearly interpolated in linear light.
+    /// An image, interpolated in linear light.
     Image {
         /// Its pixels.
         image: Arc<Image>,
+        /// Its smaller copies, if it is interpolated between these too.
+        pyramid: Option<Arc<Pyramid>>,
         /// What lies beyond u in [0, 1] and v in [0, 1].
         wrap: [Wrap; 2],
         /// Which coordinates of a surface it takes.
@@ -89,20 +95,30 @@ impl Texture {
                 }
                 Ok(Self::Noise { low: *low, high: *high, size: *size, octaves: *octaves, seed: *seed })
             }
-            description::Texture::Image { file, color_space, wrap, .. } => {
+            description::Texture::Image { file, color_space, wrap, filter, .. } => {
                 let bytes = assets.bytes(*file).ok_or_else(|| AssetError::new(format!("the image's bytes ({file}) are not here")))?;
-                Ok(Self::Image { image: Arc::new(Image::decode(&bytes, *color_space)?), wrap: *wrap, coordinates: Coordinates::default() })
+                let image = Arc::new(Image::decode(&bytes, *color_space)?);
+                let pyramid = (*filter == TextureFilter::Trilinear).then(|| Arc::new(Pyramid::new(&image)));
+                Ok(Self::Image { image, pyramid, wrap: *wrap, coordinates: Coordinates::default() })
             }
         }
     }
 
-    /// The colour at a point of a surface whose texture coordinates are these (finite): see [`Self::rgba`].
+    /// The colour at a point of a surface whose texture coordinates are these (finite), or the mean of the footprint there: see [`Self::rgba`].
     #[inline]
-    pub fn at(&self, uvs: [DVec2; 2]) -> [f32; 4] {
+    pub fn at(&self, uvs: Uvs) -> [f32; 4] {
         match self {
-            Self::Image { coordinates, .. } => self.rgba(coordinates.of(uvs)),
-            _ => self.rgba(uvs[0]),
+            Self::Image { image, pyramid: Some(pyramid), wrap, coordinates } => {
+                pyramid.look(image, *wrap, coordinates.of(uvs.sets), &coordinates.footprint(uvs.footprints))
+            }
+            Self::Image { coordinates, .. } => self.rgba(coordinates.of(uvs.sets)),
+            _ => self.rgba(uvs.sets[0]),
         }
+    }
+
+    /// Whether it looks at more than a point.
+    pub fn is_filtered(&self) -> bool {
+        matches!(self, Self::Image { pyramid: Some(_), .. })
     }
 
     /// Which coordinates of a surface it takes.
@@ -113,7 +129,7 @@ impl Texture {
         }
     }
 
-    /// The colour at its own coordinates `uv` (finite): linear Rec. 709, and opacity in [0, 1].
+    /// The colour at a point of its own coordinates `uv` (finite): linear Rec. 709, and opacity in [0, 1].
     #[inline]
     pub fn rgba(&self, uv: DVec2) -> [f32; 4] {
         match self {

@@ -5,7 +5,7 @@ use image::{DynamicImage, ImageFormat};
 use proptest::prelude::*;
 
 use super::{Image, Texture, srgb_to_linear};
-use crate::description::{self, ColorSpace, MemoryAssets, SourceId, Wrap};
+use crate::description::{self, ColorSpace, MemoryAssets, SourceId, TextureFilter, Wrap};
 
 fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
     let mut bytes = Cursor::new(Vec::new());
@@ -16,7 +16,7 @@ fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
 fn texture(file: &[u8], color_space: ColorSpace, wrap: [Wrap; 2]) -> Texture {
     let mut assets = MemoryAssets::default();
     let file = assets.insert(file.to_vec());
-    let image = description::Texture::Image { file, color_space, wrap, source: SourceId::default() };
+    let image = description::Texture::Image { file, color_space, wrap, filter: TextureFilter::default(), source: SourceId::default() };
     Texture::compile(&image, &assets).unwrap()
 }
 

@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use tessera_engine::{part::Rect, scene::Unbuilt};
+use tessera_engine::{
+    part::{self, Rect},
+    scene::Unbuilt,
+};
 
 use super::{here, render::check_samples};
 use crate::{
@@ -19,7 +22,7 @@ use crate::{
 /// When the job's own split fails, or the folder refuses the files; or, when they stand, if too many samples are invalid.
 pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
-    let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| scene.build());
+    let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| part::prepared(scene.build()));
     let parts = parts(description, threads)?;
     let (film, counters) = here::parts(&scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
     let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;

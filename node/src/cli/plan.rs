@@ -3,7 +3,10 @@
 use std::time::Instant;
 
 use serde::Serialize;
-use tessera_engine::{part::Rect, scene::Scene};
+use tessera_engine::{
+    part::{self, Rect},
+    scene::Scene,
+};
 
 use super::{here, script::Script};
 use crate::{
@@ -46,7 +49,7 @@ pub fn run(args: Args) -> Result<()> {
     let (loaded, scene) = args.script.load()?;
     let job = &loaded.description;
     let start = Instant::now();
-    let costs = costs(job, &scene.build())?;
+    let costs = costs(job, &part::prepared(scene.build()))?;
     let probe_seconds = start.elapsed().as_secs_f64();
     let nodes = farm(&args, &job.probe);
     let mut policies = job.script.as_ref().map(|script| Policies::new(script, &job.parameters)).transpose()?;

@@ -10,6 +10,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use tessera_engine::{
     description::{Filter, Render},
     film::Film,
+    part,
     scene::Scene,
 };
 
@@ -39,7 +40,7 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: Args) -> Result<()> {
     let (loaded, scene) = args.script.load()?;
-    let mut scene = scene.build();
+    let mut scene = part::prepared(scene.build());
     std::fs::create_dir_all(&args.output)
         .map_err(|error| Error::new(ExitCode::File, format!("{}: cannot be made: {error}", args.output.display())))?;
     let (name, exposure) = (loaded.description.name, loaded.description.output.exposure);

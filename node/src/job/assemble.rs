@@ -6,9 +6,7 @@ use std::{
 };
 
 use serde::Serialize;
-use tessera_engine::description::{
-    AssetId, Environment, Group, GroupId, Material, MaterialId, Object, ObjectKind, Scene, Shape, Texture, TextureId,
-};
+use tessera_engine::description::{AssetId, Environment, Group, GroupId, MaterialId, Object, ObjectKind, Scene, Shape, Texture, TextureId};
 
 use super::handle::{GroupNode, MaterialNode, NodeKind, ObjectNode, SceneNode};
 
@@ -76,14 +74,10 @@ impl Assembly {
     }
 
     fn material(&mut self, node: &MaterialNode) -> Result<MaterialId, postcard::Error> {
-        let texture_id = node.texture.as_ref().map(|texture| self.texture(texture)).transpose()?;
+        let ids = node.textures.iter().map(|texture| self.texture(texture)).collect::<Result<Vec<_>, _>>()?;
         let mut material = node.material.clone();
-        match &mut material {
-            Material::Diffuse { texture, .. }
-            | Material::RoughDiffuse { texture, .. }
-            | Material::Plastic { texture, .. }
-            | Material::Emitter { texture, .. } => *texture = texture_id,
-            Material::Mirror { .. } | Material::Metal { .. } | Material::Glass { .. } | Material::Boundary { .. } => {}
+        for texture in material.textures_mut() {
+            *texture = ids[*texture as usize];
         }
         intern(&mut self.materials, &mut self.scene.materials, material)
     }

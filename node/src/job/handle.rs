@@ -58,10 +58,10 @@ pub struct GroupNode {
     pub depth: u32,
 }
 
-/// A material with its texture.
+/// A material with its textures, which it names by their place here.
 pub struct MaterialNode {
     pub material: Material,
-    pub texture: Option<Texture>,
+    pub textures: Vec<Texture>,
 }
 
 /// All that is there.

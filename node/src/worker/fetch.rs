@@ -5,6 +5,7 @@ use std::{collections::BTreeMap, sync::Arc};
 use quinn::Connection;
 use tessera_engine::{
     description::{AssetId, AssetSource, Frame},
+    part,
     scene::Scene,
 };
 use tokio::{io::AsyncReadExt, sync::mpsc, task::spawn_blocking};
@@ -46,7 +47,8 @@ impl Fetcher {
         match self.fetch_all(frame, ids).await {
             Ok((description, assets)) => {
                 let done = self.done;
-                let compile = move || Scene::compile(&description, &assets).map(Arc::new).map_err(|error| error.to_string());
+                let compile =
+                    move || Scene::compile(&description, &assets).map(part::prepared).map(Arc::new).map_err(|error| error.to_string());
                 self.lanes.add_first(self.lanes.shared(compile), move |result| drop(done.send(compiled(result.and_then(|result| result)))));
             }
             Err(error) => drop(self.done.send(compiled(Err(error)))),

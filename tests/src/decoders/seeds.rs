@@ -7,7 +7,7 @@ use serde::Serialize;
 use tessera_engine::{
     description::{
         Aov, Aovs, AssetId, Camera, ColorSpace, Environment, Falloff, Film, Filter, Frame, FrameHash, Group, Light, Material, MeshData,
-        Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, Wrap,
+        MetallicRoughness, Object, ObjectKind, Quality, Render, Scene, Shape, SourceId, Texture, TextureFilter, Wrap,
     },
     film,
     output::exr,
@@ -230,6 +230,7 @@ fn frame() -> Frame {
         file: AssetId::of(PNG),
         color_space: ColorSpace::Linear,
         wrap: [Wrap::Repeat, Wrap::Mirror],
+        filter: TextureFilter::Bilinear,
         source: SourceId::default(),
     };
     let lights = vec![
@@ -244,6 +245,7 @@ fn frame() -> Frame {
                 Material::Mirror { reflectance: [0.9; 3] },
                 Material::smooth_glass(1.5, [0.9; 3]),
                 Material::Diffuse { reflectance: [0.5; 3], texture: Some(1) },
+                Material::MetallicRoughness(Box::new(MetallicRoughness { base_color_texture: Some(0), ..Default::default() })),
             ],
             groups: vec![Group { objects: inner }, Group { objects: outer }],
             root: 1,

@@ -6,6 +6,7 @@ mod alike;
 mod closed;
 mod coincident;
 mod furnace;
+mod gathered;
 mod media;
 mod ranges;
 mod specular;

@@ -182,6 +182,23 @@ fn materials_carry_colour_texture_mask_and_sides() {
 }
 
 #[test]
+fn smaller_copies_are_made_where_a_sampler_asks_for_mipmaps() {
+    for (filter, asks) in [
+        (None, false),
+        (Some(9728), false),
+        (Some(9729), false),
+        (Some(9984), true),
+        (Some(9985), true),
+        (Some(9986), true),
+        (Some(9987), true),
+    ] {
+        let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "metallicFactor": 0 } });
+        let model = load(textured(material, filter.map_or(json!({}), |filter| json!({ "minFilter": filter }))));
+        assert_eq!(model.textures[0].is_filtered(), asks, "{filter:?}");
+    }
+}
+
+#[test]
 fn texture_coordinates_are_those_that_the_texture_asks_for() {
     let uv = |info: serde_json::Value| {
         let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": info, "metallicFactor": 0 } });

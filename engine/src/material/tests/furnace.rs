@@ -33,9 +33,8 @@ fn white_models() -> Vec<White> {
     for alpha in [[0.5, 0.1], [0.05, 0.6], [1.0, 0.1], [0.3, 0.2], [0.01, 1e-3], [0.3, 1e-2]] {
         models.push(white_metal(alpha, Box::leak(Box::new(Albedo::fixed(alpha)))));
     }
-    for eta in [1.0001, 1.01, 1.33, 1.5, 2.4] {
-        // The narrowest lobes at the last index bend about its critical angle within one cell of the table.
-        for alpha in [1e-3, 0.04, 0.3, 1.0].into_iter().filter(|alpha| eta > 1.001 || *alpha > 0.01) {
+    for eta in [1.0 + 2e-5, 1.0001, 1.001, 1.01, 1.33, 1.5, 2.4] {
+        for alpha in [1e-4, 1e-3, 5e-3, 0.04, 0.3, 1.0] {
             let single = Some(glass(eta, alpha, false));
             models.push(White {
                 name: format!("glass {eta} {alpha}"),
@@ -129,11 +128,16 @@ fn white_materials_vanish_in_a_furnace() {
         DVec3::new(0.8 * sin, 0.6 * sin, cos)
     });
     for model in white_models() {
-        for wo in views.into_iter().chain(views.into_iter().filter(|_| model.eta.is_some()).map(|wo| -wo)) {
-            // Where all is sampled, few samples by the wide lobe weigh much.
-            let limit = if model.single.is_some() { 1e-3 } else { 2.5e-3 };
+        // About where total reflection begins.
+        let critical = model.eta.map(|eta| (1.0 - 1.0 / (eta * eta)).sqrt());
+        let about = critical.into_iter().flat_map(|cos| [0.5, 0.9, 0.97, 1.0, 1.03, 1.1, 1.5].map(|by| (cos * by).min(1.0)));
+        let about = about.map(|cos| DVec3::new(0.8 * (1.0 - cos * cos).sqrt(), 0.6 * (1.0 - cos * cos).sqrt(), cos));
+        let views: Vec<_> = views.into_iter().chain(about).collect();
+        for wo in views.iter().copied().chain(views.iter().filter(|_| model.eta.is_some()).map(|wo| -*wo)) {
+            let limit = 1e-3;
             let mut error = 1.0_f64;
-            for count in [1 << 13, 1 << 15, 1 << 18] {
+            // Where all is sampled, few samples by the wide lobe weigh much.
+            for count in [1 << 13, 1 << 15, 1 << 18, 1 << 21].into_iter().take(if model.single.is_some() { 3 } else { 4 }) {
                 // What looks wrong is looked at more closely.
                 if error.abs() >= 0.7 * limit {
                     error = model.furnace(wo, count) - 1.0;

@@ -1,5 +1,6 @@
 //! What every model must hold: tested against quadrature and statistics, generically.
 
+mod coat;
 mod furnace;
 
 use std::{f64::consts::PI, sync::LazyLock};
@@ -100,6 +101,12 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
             false,
             true,
         );
+        let of = |p: Parameters| MetallicRoughness::new(&p, Tables { facets: &ALBEDO, sheen: Some(&SHEEN), glass: None });
+        for (name, of_coat) in [("", 0.4), ("smooth ", 0.0)] {
+            let tilted = of(Parameters { clearcoat: 0.9, clearcoat_roughness: of_coat, metallic: 0.5, ..p });
+            let tilted = Box::leak(Box::new(tilted.with_coat_normal(DVec3::new(-0.5, 0.2, 1.0).normalize())));
+            add(format!("gltf {name}tilted coat {roughness}"), Bsdf::MetallicRoughness(tilted), false, wide && of_coat > 0.0);
+        }
         add(format!("gltf smooth coat {roughness}"), gltf(Parameters { clearcoat: 1.0, metallic: 1.0, ..p }), false, false);
         add(format!("gltf sheen {roughness}"), gltf(Parameters { sheen_color: DVec3::ONE, sheen_roughness: 0.4, ..p }), false, false);
         add(format!("gltf rough sheen {roughness}"), gltf(Parameters { sheen_color: color, sheen_roughness: 1.0, ..p }), false, wide);
@@ -219,7 +226,8 @@ fn samples_are_worth_what_evaluation_says() {
 fn models_are_reciprocal() {
     let mut failures = Failures::default();
     let mut state = 2;
-    for case in CASES.iter() {
+    // Of those two parts are reciprocal, each with its own cosine.
+    for case in CASES.iter().filter(|case| !case.name.contains("tilted coat")) {
         for _ in 0..2000 {
             let mut direction = || {
                 let z = 2.0 * random(&mut state) - 1.0;

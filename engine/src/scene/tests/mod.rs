@@ -1,9 +1,12 @@
 //! Scenes as users make them, held against brute force and closed forms.
 
 mod brute_force;
+mod brushed;
 mod builds;
+mod coats;
 mod cones;
 mod errors;
+mod footprints;
 mod meshes;
 mod models;
 mod pencils;

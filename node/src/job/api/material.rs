@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use mlua::Value;
 use tessera_engine::{
-    description::{Fresnel, Material, Rgb, Texture},
+    description::{Fresnel, Material, Rgb, Texture, TextureId},
     material::metals,
 };
 
@@ -35,27 +35,27 @@ pub const FUNCTIONS: &[Function] = &[
 ];
 
 const WHITE: Rgb = [1.0; 3];
-const EXPECTED: &str = "a material (tessera.diffuse, mirror, metal, glass, plastic, emitter or boundary)";
+const EXPECTED: &str = "a material (tessera.diffuse, mirror, metal, glass, plastic, metallic_roughness, emitter or boundary)";
 
 /// Radiance has no physical bound; this keeps sums of it finite in single precision.
 pub const BRIGHTEST: f64 = 1e30;
 
-const COAT: Range = Range { lowest: 1.0, highest: 10.0, open: false, words: "a number from 1 to 10" };
+pub const COAT: Range = Range { lowest: 1.0, highest: 10.0, open: false, words: "a number from 1 to 10" };
 
 fn diffuse(keys: &Keys) -> mlua::Result<Value> {
     let (reflectance, texture) = keys.or("reflectance", ([0.5; 3], None), color_or_texture)?;
     let roughness = keys.or("roughness", 0.0, |field| field.number(UNIT))?;
     let material = if roughness == 0.0 {
-        Material::Diffuse { reflectance, texture: None }
+        Material::Diffuse { reflectance, texture: only(&texture) }
     } else {
-        Material::RoughDiffuse { reflectance, texture: None, roughness }
+        Material::RoughDiffuse { reflectance, texture: only(&texture), roughness }
     };
     make(keys, material, texture)
 }
 
 fn mirror(keys: &Keys) -> mlua::Result<Value> {
     let reflectance = keys.or("reflectance", [0.9; 3], |field| field.color(1.0))?;
-    make(keys, Material::Mirror { reflectance }, None)
+    make(keys, Material::Mirror { reflectance }, [])
 }
 
 /// By name, by its index of refraction, or by colour.
@@ -86,7 +86,7 @@ fn metal(keys: &Keys) -> mlua::Result<Value> {
         false => field.number(UNIT).map(|roughness| [roughness; 2]),
     })?;
     let multiple_scattering = keys.or("multiple_scattering", true, |field| field.boolean())?;
-    make(keys, Material::Metal { fresnel, roughness, multiple_scattering }, None)
+    make(keys, Material::Metal { fresnel, roughness, multiple_scattering }, [])
 }
 
 fn named(field: &Field) -> mlua::Result<Fresnel> {
@@ -112,20 +112,20 @@ fn glass(keys: &Keys) -> mlua::Result<Value> {
     let interior = medium::optional(keys, "interior")?;
     let priority = keys.or("priority", 0, |field| field.integer32(0, 255))? as u8;
     let multiple_scattering = keys.or("multiple_scattering", true, |field| field.boolean())?;
-    make(keys, Material::Glass { ior, reflectance, transmittance, roughness, multiple_scattering, interior, priority }, None)
+    make(keys, Material::Glass { ior, reflectance, transmittance, roughness, multiple_scattering, interior, priority }, [])
 }
 
 fn plastic(keys: &Keys) -> mlua::Result<Value> {
     let (reflectance, texture) = keys.or("reflectance", ([0.5; 3], None), color_or_texture)?;
     let ior = keys.or("ior", 1.5, |field| field.number(COAT))?;
     let roughness = keys.or("roughness", 0.0, |field| field.number(UNIT))?;
-    make(keys, Material::Plastic { reflectance, texture: None, ior, roughness }, texture)
+    make(keys, Material::Plastic { reflectance, texture: only(&texture), ior, roughness }, texture)
 }
 
 fn emitter(keys: &Keys) -> mlua::Result<Value> {
     let (radiance, texture) = texture_or(keys.required("radiance")?, |field| field.color(BRIGHTEST))?;
     let two_sided = keys.or("two_sided", false, |field| field.boolean())?;
-    make(keys, Material::Emitter { radiance, texture: None, two_sided }, texture)
+    make(keys, Material::Emitter { radiance, texture: only(&texture), two_sided }, texture)
 }
 
 fn boundary(keys: &Keys) -> mlua::Result<Value> {
@@ -135,27 +135,38 @@ fn boundary(keys: &Keys) -> mlua::Result<Value> {
             .with_help("a boundary surrounds a medium: interior = tessera.medium { ... }")
             .into());
     };
-    make(keys, Material::Boundary { interior }, None)
+    make(keys, Material::Boundary { interior }, [])
 }
 
-fn make(keys: &Keys, material: Material, texture: Option<Texture>) -> mlua::Result<Value> {
-    keys.make(|_| Thing::Material(Arc::new(MaterialNode { material, texture })))
+pub fn make(keys: &Keys, material: Material, textures: impl IntoIterator<Item = Texture>) -> mlua::Result<Value> {
+    let textures = textures.into_iter().collect();
+    keys.make(|_| Thing::Material(Arc::new(MaterialNode { material, textures })))
+}
+
+/// The number of a material's only texture.
+fn only(texture: &Option<Texture>) -> Option<TextureId> {
+    texture.as_ref().map(|_| 0)
 }
 
 fn color_or_texture(field: Field) -> mlua::Result<(Rgb, Option<Texture>)> {
     texture_or(field, |field| field.color(1.0))
 }
 
-fn texture_or(field: Field, color: impl FnOnce(&Field) -> mlua::Result<Rgb>) -> mlua::Result<(Rgb, Option<Texture>)> {
+/// A colour, or white and a texture.
+pub fn texture_or(field: Field, color: impl FnOnce(&Field) -> mlua::Result<Rgb>) -> mlua::Result<(Rgb, Option<Texture>)> {
     if field.value.is_userdata() {
-        let texture = field.thing("a colour or a texture (tessera.checker, gradient, noise or image)", |handle| match &handle.thing {
-            Thing::Texture(texture) => Some(texture.clone()),
-            _ => None,
-        })?;
-        Ok((WHITE, Some(texture)))
+        Ok((WHITE, Some(texture(&field, "a colour or a texture (tessera.checker, gradient, noise or image)")?)))
     } else {
         Ok((color(&field)?, None))
     }
+}
+
+/// A texture, where one was `expected`.
+pub fn texture(field: &Field, expected: &str) -> mlua::Result<Texture> {
+    field.thing(expected, |handle| match &handle.thing {
+        Thing::Texture(texture) => Some(texture.clone()),
+        _ => None,
+    })
 }
 
 fn read(field: &Field) -> mlua::Result<Arc<MaterialNode>> {

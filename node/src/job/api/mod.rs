@@ -10,6 +10,7 @@ mod light;
 mod material;
 mod medium;
 mod mesh;
+mod metallic_roughness;
 mod model;
 mod param;
 mod plan;
@@ -66,6 +67,7 @@ pub const FUNCTIONS: &[&[Function]] = &[
     group::FUNCTIONS,
     transform::FUNCTIONS,
     material::FUNCTIONS,
+    metallic_roughness::FUNCTIONS,
     medium::FUNCTIONS,
     texture::FUNCTIONS,
     color::FUNCTIONS,

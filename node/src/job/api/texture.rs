@@ -1,7 +1,7 @@
 //! Textures.
 
 use mlua::Value;
-use tessera_engine::description::{ColorSpace, Texture, Wrap};
+use tessera_engine::description::{ColorSpace, Texture, TextureFilter, Wrap};
 
 use super::{Form, Function, material::BRIGHTEST, model::asset};
 use crate::job::{
@@ -13,7 +13,7 @@ pub const FUNCTIONS: &[Function] = &[
     Function { path: "checker", form: Form::Table, keys: &["even", "odd", "size", "name"], make: checker },
     Function { path: "gradient", form: Form::Table, keys: &["from", "to", "start", "end", "name"], make: gradient },
     Function { path: "noise", form: Form::Table, keys: &["low", "high", "size", "octaves", "seed", "name"], make: noise },
-    Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "name"], make: image },
+    Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "filter", "name"], make: image },
 ];
 
 fn checker(keys: &Keys) -> mlua::Result<Value> {
@@ -54,8 +54,10 @@ fn image(keys: &Keys) -> mlua::Result<Value> {
     let usual = if ending == "hdr" { ColorSpace::Linear } else { ColorSpace::Srgb };
     let color_space = keys.or("color_space", usual, |field| field.choice(&[("srgb", ColorSpace::Srgb), ("linear", ColorSpace::Linear)]))?;
     let wrap = keys.or("wrap", [Wrap::Repeat; 2], wrap)?;
+    let filters = [("bilinear", TextureFilter::Bilinear), ("trilinear", TextureFilter::Trilinear)];
+    let filter = keys.or("filter", TextureFilter::Bilinear, |field| field.choice(&filters))?;
     let (_, id) = asset(&file, &name)?;
-    keys.make(|source| Thing::Texture(Texture::Image { file: id, color_space, wrap, source }))
+    keys.make(|source| Thing::Texture(Texture::Image { file: id, color_space, wrap, filter, source }))
 }
 
 /// One word for both directions, or a list of two.

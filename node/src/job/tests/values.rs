@@ -1,7 +1,8 @@
 //! What keys become in the description.
 
 use tessera_engine::description::{
-    Aov, AssetSource, Camera, ColorSpace, Environment, Falloff, Light, Material, MeshData, ObjectKind, Render, Shape, Texture, Wrap,
+    Absorption, Aov, AssetSource, Bumps, Camera, ColorSpace, Environment, Falloff, Light, Material, MeshData, MetallicRoughness,
+    ObjectKind, Render, Shape, Texture, TextureFilter, Wrap,
 };
 
 use super::{BUDGET, job_with, run, small_job};
@@ -156,7 +157,7 @@ fn lights_cameras_and_textures_are_described() {
     let script = job_with(
         "return tessera.job {
   scene = tessera.scene {
-    objects = { tessera.plane { material = tessera.diffuse { reflectance = tessera.image { file = 'tiny.png', wrap = {'clamp', 'mirror'}, color_space = 'linear' } } } },
+    objects = { tessera.plane { material = tessera.diffuse { reflectance = tessera.image { file = 'tiny.png', wrap = {'clamp', 'mirror'}, color_space = 'linear', filter = 'trilinear' } } } },
     lights = { tessera.point { position = {1, 2, 3}, intensity = 5, falloff = 'none' }, tessera.directional { direction = {0, -1, 0}, irradiance = {1, 2, 3} } },
   },
   camera = tessera.perspective { eye = {0, 1, 5}, look_at = {0, 1, 0}, up = {0, 1, 0}, fov = 60 },
@@ -174,10 +175,78 @@ fn lights_cameras_and_textures_are_described() {
     ));
     assert!(matches!(frame.scene.lights[1], Light::Directional { irradiance: [1.0, 2.0, 3.0], .. }));
     assert!(matches!(frame.camera, Camera::Perspective { horizontal_fov: 60.0, .. }));
-    let Texture::Image { wrap, color_space, file, .. } = frame.scene.textures[0] else { panic!() };
-    assert_eq!((wrap, color_space), ([Wrap::Clamp, Wrap::Mirror], ColorSpace::Linear));
+    let Texture::Image { wrap, color_space, filter, file, .. } = frame.scene.textures[0] else { panic!() };
+    assert_eq!((wrap, color_space, filter), ([Wrap::Clamp, Wrap::Mirror], ColorSpace::Linear, TextureFilter::Trilinear));
     assert_eq!(job.description.assets, [file]);
     assert!(matches!(frame.scene.materials[0], Material::Diffuse { texture: Some(0), .. }));
+}
+
+#[test]
+fn the_metallic_roughness_model_is_described_by_gltf_s_names() {
+    let script = job_with(
+        "local bumps = tessera.image { file = 'tiny.png', color_space = 'linear' }
+local all = tessera.metallic_roughness {
+  base_color = tessera.checker {}, metallic = 0.25, roughness = 0.5, metallic_roughness = bumps, normal = bumps, normal_scale = 2,
+  emissive = {1, 2, 3}, ior = 1.75, specular = 0.5, specular_color = {1, 0.5, 2}, transmission = 0.125, volume = true, attenuation_color = {0.5, 1, 0.25},
+  attenuation_distance = 4, clearcoat = 0.75, clearcoat_roughness = 0.0625, clearcoat_normal = tessera.noise {}, clearcoat_normal_scale = -1,
+  sheen_color = {0, 0.5, 1}, sheen_roughness = 0.375, anisotropy = 0.625, anisotropy_rotation = 450,
+}
+return tessera.job {
+  scene = tessera.scene { objects = { tessera.sphere { material = tessera.metallic_roughness {} }, tessera.sphere { material = all } } },
+  film = { width = 8, height = 8 },
+}",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("tiny.png"), tiny_png()).unwrap();
+    std::fs::write(folder.path().join("job.lua"), script).unwrap();
+    let job = super::load_file(&folder.path().join("job.lua"), &[], BUDGET).unwrap_or_else(|fault| panic!("{fault}"));
+    let scene = &job.description.frame.scene;
+    assert_eq!(scene.materials[0], Material::MetallicRoughness(Box::default()));
+    let Material::MetallicRoughness(model) = &scene.materials[1] else { panic!() };
+    assert!(matches!(scene.textures[..], [Texture::Checker { .. }, Texture::Image { .. }, Texture::Noise { .. }]));
+    let expected = MetallicRoughness {
+        base_color: [1.0; 3],
+        base_color_texture: Some(0),
+        metallic: 0.25,
+        roughness: 0.5,
+        metallic_roughness_texture: Some(1),
+        normal: Some(Bumps { texture: 1, scale: 2.0 }),
+        emissive: [1.0, 2.0, 3.0],
+        emissive_texture: None,
+        ior: 1.75,
+        specular: 0.5,
+        specular_color: [1.0, 0.5, 2.0],
+        transmission: 0.125,
+        volume: Some(Absorption { color: [0.5, 1.0, 0.25], distance: 4.0 }),
+        clearcoat: 0.75,
+        clearcoat_roughness: 0.0625,
+        clearcoat_normal: Some(Bumps { texture: 2, scale: -1.0 }),
+        sheen_color: [0.0, 0.5, 1.0],
+        sheen_roughness: 0.375,
+        anisotropy: 0.625,
+        anisotropy_rotation: std::f32::consts::FRAC_PI_2,
+    };
+    assert_eq!(**model, expected);
+}
+
+#[test]
+fn numbers_of_the_metallic_roughness_model_are_no_colours() {
+    for (keys, message) in [
+        ("normal = tessera.image { file = 'tiny.png' }", "`normal` holds numbers, not colours"),
+        ("normal = {1, 2, 3}", "`normal` must be a texture"),
+        ("normal_scale = 2", "`normal_scale` goes with `normal`"),
+        ("attenuation_distance = 2", "go with `volume = true`"),
+        ("ior = 0.5", "`ior` must be a number from 1 to 10"),
+    ] {
+        let script = job_with(&format!(
+            "return tessera.job {{ scene = tessera.scene {{ objects = {{ tessera.sphere {{ material = tessera.metallic_roughness {{ {keys} }} }} }} }} }}"
+        ));
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("tiny.png"), tiny_png()).unwrap();
+        std::fs::write(folder.path().join("job.lua"), script).unwrap();
+        let Err(fault) = super::load_file(&folder.path().join("job.lua"), &[], BUDGET) else { panic!("{keys} is taken") };
+        assert!(fault.to_string().contains(message), "{fault}");
+    }
 }
 
 /// One white pixel.

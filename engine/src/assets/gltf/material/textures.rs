@@ -7,7 +7,7 @@ use gltf::json::{
     Index, Root,
     extensions::texture::TextureTransform,
     image::Image as ImageEntry,
-    texture::{Info, MagFilter, Sampler, Texture as TextureEntry, WrappingMode},
+    texture::{Info, MagFilter, MinFilter, Sampler, Texture as TextureEntry, WrappingMode},
     validation::Checked,
 };
 use serde::Deserialize;
@@ -24,7 +24,7 @@ use crate::{
         warnings::Warnings,
     },
     description::{ColorSpace, Wrap},
-    texture::{Coordinates, Image, Texture, texture_transform},
+    texture::{Coordinates, Image, Pyramid, Texture, texture_transform},
 };
 
 /// Most bytes that all images of a model may take in memory.
@@ -77,12 +77,14 @@ pub(super) struct Images<'a> {
     textures: BTreeMap<Key, usize>,
     /// By number, and whether linear.
     images: BTreeMap<(usize, bool), Arc<Image>>,
+    /// Of these images, those that a sampler asks for.
+    pyramids: BTreeMap<(usize, bool), Arc<Pyramid>>,
     bytes: usize,
 }
 
 impl<'a> Images<'a> {
     pub fn new(root: &'a Root, buffers: &'a Buffers<'a>, files: &'a Files<'a>) -> Self {
-        Self { root, buffers, files, textures: BTreeMap::new(), images: BTreeMap::new(), bytes: 0 }
+        Self { root, buffers, files, textures: BTreeMap::new(), images: BTreeMap::new(), pyramids: BTreeMap::new(), bytes: 0 }
     }
 
     /// The place in `textures` of a texture of the file, put there when it is asked for first. `second` says which set of a mesh's coordinates it takes.
@@ -100,12 +102,12 @@ impl<'a> Images<'a> {
             return Ok(known);
         }
         let entry = at(&self.root.textures, wanted.texture, "texture")?;
-        let wrap = match entry.sampler {
-            Some(sampler) => wrap(at(&self.root.samplers, sampler, "sampler")?, number, warnings),
-            None => [Wrap::Repeat; 2],
-        };
+        let sampler = entry.sampler.map(|sampler| at(&self.root.samplers, sampler, "sampler")).transpose()?;
+        let wrap = sampler.map_or([Wrap::Repeat; 2], |sampler| wrap(sampler, number, warnings));
         let coordinates = Coordinates { second, transform: wanted.transform };
-        textures.push(Texture::Image { image: self.image(entry.source, wanted.space)?, wrap, coordinates });
+        let image = self.image(entry.source, wanted.space)?;
+        let pyramid = sampler.filter(|sampler| asks_for_copies(sampler)).map(|_| self.pyramid(entry.source, wanted.space, &image));
+        textures.push(Texture::Image { image, pyramid: pyramid.transpose()?, wrap, coordinates });
         self.textures.insert(key, textures.len() - 1);
         Ok(textures.len() - 1)
     }
@@ -117,13 +119,29 @@ impl<'a> Images<'a> {
         }
         let entry = at(&self.root.images, index, "image")?;
         let image = self.decode(entry, space).context(|| label("image", index.value(), entry.name.as_deref()))?;
-        self.bytes += image.memory();
-        if self.bytes > MAX_IMAGE_BYTES {
-            return Err(AssetError::new(format!("its images take more than {} GiB of memory", MAX_IMAGE_BYTES >> 30)));
-        }
+        self.take(image.memory())?;
         let image = Arc::new(image);
         self.images.insert(key, image.clone());
         Ok(image)
+    }
+
+    fn pyramid(&mut self, index: Index<ImageEntry>, space: ColorSpace, image: &Image) -> Result<Arc<Pyramid>, AssetError> {
+        let key = (index.value(), space == ColorSpace::Linear);
+        if let Some(known) = self.pyramids.get(&key) {
+            return Ok(known.clone());
+        }
+        let pyramid = Arc::new(Pyramid::new(image));
+        self.take(pyramid.memory())?;
+        self.pyramids.insert(key, pyramid.clone());
+        Ok(pyramid)
+    }
+
+    fn take(&mut self, bytes: usize) -> Result<(), AssetError> {
+        self.bytes += bytes;
+        if self.bytes > MAX_IMAGE_BYTES {
+            return Err(AssetError::new(format!("its images take more than {} GiB of memory", MAX_IMAGE_BYTES >> 30)));
+        }
+        Ok(())
     }
 
     fn decode(&self, entry: &ImageEntry, space: ColorSpace) -> Result<Image, AssetError> {
@@ -133,6 +151,15 @@ impl<'a> Images<'a> {
             (None, None) => Err(AssetError::new("has neither bufferView nor uri")),
         }
     }
+}
+
+/// Whether a sampler makes small what is far away by smaller copies of the image.
+fn asks_for_copies(sampler: &Sampler) -> bool {
+    use MinFilter::{LinearMipmapLinear, LinearMipmapNearest, NearestMipmapLinear, NearestMipmapNearest};
+    matches!(
+        sampler.min_filter,
+        Some(Checked::Valid(LinearMipmapLinear | LinearMipmapNearest | NearestMipmapLinear | NearestMipmapNearest))
+    )
 }
 
 fn wrap(sampler: &Sampler, texture: usize, warnings: &mut Warnings) -> [Wrap; 2] {
