@@ -263,14 +263,14 @@ mod tests {
     #[test]
     fn the_hash_is_that_of_this_revision() {
         let pixels = hex(pixels(&compiled(1)).unwrap());
-        assert_eq!((crate::REVISION, pixels.as_str()), (3, "bb53a9fc2c50cb86b0ffece72f6a8519d49e916ded3b5fbff15b7cb2044dc7ad"));
+        assert_eq!((crate::REVISION, pixels.as_str()), (4, "bb53a9fc2c50cb86b0ffece72f6a8519d49e916ded3b5fbff15b7cb2044dc7ad"));
     }
 
     /// The same of paths.
     #[test]
     fn the_hash_of_paths_is_that_of_this_revision() {
         let pixels = hex(pixels(&lit(1)).unwrap());
-        assert_eq!((crate::REVISION, pixels.as_str()), (3, "b4a096514e2259f2424daa26d1e9cfd9161bdb4db31e316fc1794702c75050c1"));
+        assert_eq!((crate::REVISION, pixels.as_str()), (4, "e93f6215ea39d30bb64dc3b09aec951552d4d4e23e072217b3c30f4bf554bb67"));
     }
 
     /// Every kind of surface, light and medium is met, and nothing in it is no number.

@@ -13,7 +13,9 @@ impl Scene {
         match self.render {
             Render::Raycast => vec!["nearest hits alone: no shadows, no reflections; every light shines unhindered".into()],
             Render::Whitted { .. } => vec![self.lights_of_whitted(), self.surfaces_of_whitted()],
-            Render::Path { .. } => vec![self.local_lights(), self.distant_lights(), self.surfaces(), self.media(), self.lens()],
+            Render::Path { .. } => {
+                vec![self.local_lights(), self.distant_lights(), self.surfaces(), self.gathering(), self.media(), self.lens()]
+            }
         }
     }
 
@@ -66,6 +68,14 @@ impl Scene {
             ([], _) => "matte surfaces alone".into(),
             (_, []) => format!("{}, and matte surfaces", there.join(", ")),
             _ => format!("{}; nothing asks for {}", there.join(", "), absent.join(", ")),
+        }
+    }
+
+    fn gathering(&self) -> String {
+        if self.gathered().is_some() {
+            "smooth glass or mirrors gather light: photons are sent to them first, and paths look for light where these came from".into()
+        } else {
+            "nothing gathers the light of lamps or of the sun: no photons are sent".into()
         }
     }
 
