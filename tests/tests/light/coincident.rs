@@ -70,7 +70,7 @@ fn water_on_glass_without_a_gap_is_a_stack_of_three_borders() {
             // A black sheet within the second of them swallows what gets there.
             for (side, (eye, sheet)) in [(5.0, -2.0), (-9.0, -0.5)].into_iter().enumerate() {
                 // Known to less than 0.1 %.
-                let seen = things(sheet).seen([0.1, 0.2, eye], [0.1, 0.2, 0.0], path(64), 1 << 9);
+                let seen = things(sheet).seen([0.1, 0.2, eye], [0.1, 0.2, 0.0], path(64), 1 << 11);
                 assert!(seen.iter().all(|seen| seen.error() < 1e-3 * seen.mean));
                 assert_is(&format!("{what} in the order {order:?}, from side {side}"), seen, times(expected[side]));
             }

@@ -25,14 +25,15 @@ fn glass(interior: Option<Medium>) -> Material {
 #[test]
 fn a_sun_shines_through_a_pane() {
     let sun: Light = directional([0.0, -1.0, 0.0], RADIANCE, 0.5);
-    let pane = Shape::Box { min: [-2.0, 1.0, -2.0], max: [2.0, 1.5, 2.0] };
+    // So large that it reflects next to nothing of the ground beside it, on which the sun shines unhindered.
+    let pane = Shape::Box { min: [-300.0, 1.0, -300.0], max: [300.0, 1.5, 300.0] };
     let reflected = (0.5_f64 / 2.5).powi(2);
     let absorption: Rgb = [0.25, 0.5, 1.0];
     for (what, interior) in [("clear", None), ("coloured", Some(Medium { absorption, scattering: [0.0; 3], anisotropy: 0.0 }))] {
         let left = |channel: usize| if interior.is_some() { (-0.5 * f64::from(absorption[channel])).exp() } else { 1.0 };
         let through = |channel| (1.0 - reflected).powi(2) * left(channel);
         let expected = [0, 1, 2].map(|at| f64::from(ALBEDO[at]) * FRAC_1_PI * f64::from(RADIANCE[at]) * through(at));
-        let seen = stage().with(pane.clone(), glass(interior)).lit(sun.clone()).seen(EYE, [0.0; 3], path(4), 256);
+        let seen = stage().with(pane.clone(), glass(interior)).lit(sun.clone()).seen(EYE, [0.0; 3], path(4), 1024);
         assert_is(&format!("{what} pane"), seen, expected);
     }
 }
@@ -46,7 +47,7 @@ fn a_mirror_shows_the_ground_a_lamp_that_looks_away() {
     let image = [(0.45, 0.05), (0.55, 0.05), (0.55, -0.05), (0.45, -0.05)].map(|(x, z)| DVec3::new(x, 3.0, z));
     let share = FRAC_1_PI * lamberts_polygon(DVec3::ZERO, DVec3::Y, &image);
     let expected = [0, 1, 2].map(|at| f64::from(ALBEDO[at]) * f64::from(RADIANCE[at]) * [0.9, 0.8, 0.7][at] * share);
-    assert_is("mirror", scene.seen(EYE, [0.0; 3], path(3), 256), expected);
+    assert_is("mirror", scene.seen(EYE, [0.0; 3], path(3), 1024), expected);
 }
 
 /// Of a lamp whose shape no one knows, no photons are sent: only chance finds it.
