@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     Integrator, RayCounts,
-    chain::Chain,
+    chain::{self, Chain},
     found,
     shading::{self, Shading},
 };
@@ -156,7 +156,12 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
             match (next, &met) {
                 (Next::Along(scattered, direction, vertex), _) => {
                     if self.caustics.is_some() && !scattered.specular {
-                        walk.chain = vertex.normal.map(|_| Chain { point: vertex.point, direction, pdf: scattered.pdf });
+                        walk.chain = vertex.normal.map(|_| Chain {
+                            point: vertex.point,
+                            direction,
+                            pdf: scattered.pdf,
+                            sent: chain::sent(walk.throughput),
+                        });
                     }
                     if !self.goes_on(&mut walk, &scattered, vertex, sampler, sets) {
                         return radiance;

@@ -15,11 +15,13 @@ const EVEN_SHARE: f64 = 0.1;
 #[derive(Debug, Default)]
 pub struct Squares(Vec<Square>);
 
-/// Four quarters: left and right, below and above.
+/// Four quarters: left and right, in the lower row and the upper one.
 #[derive(Clone, Copy, Debug)]
 struct Square {
-    /// Their sum is about 1.
-    shares: [f32; 4],
+    /// The share of the lower row.
+    lower: f32,
+    /// The share of the left one in each row.
+    left: [f32; 2],
     /// Squares of these numbers; 0 for those that are not divided.
     inner: [u32; 4],
 }
@@ -33,7 +35,7 @@ impl Squares {
     /// Adds the square of this corner and size.
     fn divide(&mut self, points: &mut [(DVec2, f64)], corner: DVec2, size: f64, depth: u32) -> u32 {
         let number = self.0.len();
-        self.0.push(Square { shares: [0.25; 4], inner: [0; 4] });
+        self.0.push(Square { lower: 0.5, left: [0.5; 2], inner: [0; 4] });
         let half = 0.5 * size;
         let middle = corner + DVec2::splat(half);
         let quarter = |point: DVec2| usize::from(point.x >= middle.x) + 2 * usize::from(point.y >= middle.y);
@@ -48,7 +50,9 @@ impl Squares {
                 self.0[number].inner[at] = self.divide(inner, corner, half, depth + 1);
             }
         }
-        self.0[number].shares = shares.map(|share| share as f32);
+        let [a, b, c, d] = shares;
+        self.0[number].lower = ((a + b) / ((a + b) + (c + d))) as f32;
+        self.0[number].left = [a / (a + b), c / (c + d)].map(|left| left as f32);
         number as u32
     }
 
@@ -57,16 +61,13 @@ impl Squares {
     pub fn sample(&self, first: u32, mut u: DVec2) -> (DVec2, f64) {
         let (mut corner, mut size, mut density, mut at) = (DVec2::ZERO, 1.0, 1.0, first as usize);
         loop {
-            let Square { shares, inner } = self.0[at];
-            let [a, b, c, d] = shares.map(f64::from);
-            let all = (a + b) + (c + d);
-            let (y, row) = choose(u.y, (a + b) / all);
-            let [left, right] = if row == 0 { [a, b] } else { [c, d] };
-            let (x, column) = choose(u.x, left / (left + right));
+            let Square { lower, left, inner } = &self.0[at];
+            let (y, row, of_row) = choose(u.y, f64::from(*lower));
+            let (x, column, of_column) = choose(u.x, f64::from(left[row]));
             u = DVec2::new(x, y);
             size *= 0.5;
             corner += DVec2::new(column as f64, row as f64) * size;
-            density *= 4.0 * [left, right][column] / all;
+            density *= 4.0 * of_row * of_column;
             at = inner[row * 2 + column] as usize;
             if at == 0 {
                 return (corner + u * size, density);
@@ -79,12 +80,13 @@ impl Squares {
     pub fn pdf(&self, first: u32, mut point: DVec2) -> f64 {
         let (mut density, mut at) = (1.0, first as usize);
         loop {
-            let Square { shares, inner } = self.0[at];
-            let [a, b, c, d] = shares.map(f64::from);
+            let Square { lower, left, inner } = &self.0[at];
             point *= 2.0;
-            let quarter = usize::from(point.x >= 1.0) + 2 * usize::from(point.y >= 1.0);
-            point -= DVec2::new((quarter % 2) as f64, (quarter / 2) as f64);
-            density *= 4.0 * [a, b, c, d][quarter] / ((a + b) + (c + d));
+            let [column, row] = [point.x, point.y].map(|along| usize::from(along >= 1.0));
+            point -= DVec2::new(column as f64, row as f64);
+            let share = |lower: f32, part: usize| if part == 0 { f64::from(lower) } else { 1.0 - f64::from(lower) };
+            density *= 4.0 * share(*lower, row) * share(left[row], column);
+            let quarter = 2 * row + column;
             at = inner[quarter] as usize;
             if at == 0 {
                 return density;
@@ -93,9 +95,9 @@ impl Squares {
     }
 }
 
-/// The lower part of an interval, which is chosen as often as its share says, or the upper one: the number within it, and which one.
+/// The lower part of an interval, which is chosen as often as its share says, or the upper one: the number within it, which one, and its share.
 #[inline]
-fn choose(u: f64, lower: f64) -> (f64, usize) {
-    let (within, part) = if u < lower { (u / lower, 0) } else { ((u - lower) / (1.0 - lower), 1) };
-    (within.min(1.0 - f64::EPSILON), part)
+fn choose(u: f64, lower: f64) -> (f64, usize, f64) {
+    let (within, part, share) = if u < lower { (u / lower, 0, lower) } else { ((u - lower) / (1.0 - lower), 1, 1.0 - lower) };
+    (within.min(1.0 - f64::EPSILON), part, share)
 }
