@@ -96,7 +96,7 @@ impl Batch<'_> {
                 inside.cross(&surface, direction);
             }
             flux *= luminance(scattered.weight) * scattered.eta2;
-            if !(flux > 0.0) {
+            if flux <= 0.0 || flux.is_nan() {
                 return None;
             }
             caster = Some((surface.object, bounce));

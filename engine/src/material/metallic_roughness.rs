@@ -167,7 +167,7 @@ impl<'a> MetallicRoughness<'a> {
 
     /// A direction as the coat sees it.
     #[inline(always)]
-    fn to_coat(&self, w: DVec3) -> DVec3 {
+    fn in_coat(&self, w: DVec3) -> DVec3 {
         match self.coat_axes {
             None => w,
             Some([x, y, z]) => DVec3::new(x.dot(w), y.dot(w), z.dot(w)),
@@ -231,7 +231,7 @@ impl<'a> MetallicRoughness<'a> {
     fn seen(&self, w: DVec3) -> Seen {
         let bare = self.volume && w.z < 0.0;
         let coat =
-            if bare || self.clearcoat == 0.0 { 0.0 } else { self.clearcoat * self.coat.albedo(self.tables.facets, self.to_coat(w))[0] };
+            if bare || self.clearcoat == 0.0 { 0.0 } else { self.clearcoat * self.coat.albedo(self.tables.facets, self.in_coat(w))[0] };
         let fibres = match self.tables.sheen {
             Some(table) if !bare && self.sheen_color != DVec3::ZERO => table.at(self.sheen_roughness, w.z),
             _ => 0.0,
@@ -341,7 +341,7 @@ impl MetallicRoughness<'_> {
     /// What the coat reflects from one direction of the outside to another, times the cosine with its normal; nothing where it is seen from behind.
     #[inline(always)]
     fn evaluate_coat(&self, wo: DVec3, wi: DVec3) -> (DVec3, f64) {
-        let (o, i) = (self.to_coat(wo), self.to_coat(wi));
+        let (o, i) = (self.in_coat(wo), self.in_coat(wi));
         if self.coat_axes.is_some() && !(o.z > 0.0 && i.z > 0.0) {
             return (DVec3::ZERO, 0.0);
         }
@@ -351,7 +351,7 @@ impl MetallicRoughness<'_> {
     /// A direction in which the coat reflects, where that leads to the outside.
     #[inline(always)]
     fn sample_coat(&self, wo: DVec3, u: DVec2) -> Option<Scattered> {
-        let o = self.to_coat(wo);
+        let o = self.in_coat(wo);
         let Some([x, y, z]) = self.coat_axes else { return self.coat.sample(o, u, |fresnel| fresnel) };
         let s = self.coat.sample(o, u, |fresnel| fresnel).filter(|_| o.z > 0.0)?;
         let wi = x * s.wi.x + y * s.wi.y + z * s.wi.z;

@@ -171,11 +171,11 @@ impl<'s> Sources<'s> {
                 let (x, y) = orthonormal_basis(towards);
                 let local = uniform_cone(sampler.pair(set::PLACE), sin2);
                 let way = x * local.x + y * local.y + towards * local.z;
-                Some(self.from_afar(target, way, radiance / uniform_cone_pdf(sin2), u))
+                Some(self.across(target, way, radiance / uniform_cone_pdf(sin2), u))
             }
             Origin::Environment => {
                 let (towards, radiance, pdf) = self.environment.sample(sampler.pair(set::PLACE))?;
-                Some(self.from_afar(target, towards, radiance / pdf, u))
+                Some(self.across(target, towards, radiance / pdf, u))
             }
         }?;
         let flux = flux / density;
@@ -184,7 +184,7 @@ impl<'s> Sources<'s> {
     }
 
     /// From outside of everything, through the target's cross-section.
-    fn from_afar(&self, target: Ball, towards: DVec3, irradiance: DVec3, u: DVec2) -> (DVec3, DVec3, f64) {
+    fn across(&self, target: Ball, towards: DVec3, irradiance: DVec3, u: DVec2) -> (DVec3, DVec3, f64) {
         let (x, y) = orthonormal_basis(towards);
         let at = concentric_disc(u) * target.radius;
         let far = self.whole.radius + target.radius + target.center.distance(self.whole.center);
