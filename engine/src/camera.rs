@@ -183,9 +183,7 @@ impl Camera {
             }
         }
     }
-}
 
-impl Camera {
     /// How far a place moves on its tangent plane when it is seen one pixel to the right, and one pixel down, of where it is: to first order
     /// (Igehy, "Tracing Ray Differentials", 1999). A thin lens sees as its middle does. Not finite where the plane is seen edge on.
     pub fn pixel_on(&self, place: DVec3, normal: DVec3) -> [DVec3; 2] {

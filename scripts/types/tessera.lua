@@ -350,7 +350,7 @@ function tessera.metal(keys) end
 ---@field multiple_scattering? boolean as for metals
 ---@field name? string for messages
 
----A dielectric: reflects and refracts by Fresnel's equations. Its shape should be closed; the normal points out of the glass. It blocks the straight way to lights: behind it, light is found by chance (caustics), except where whitted has transparent_shadows.
+---A dielectric: reflects and refracts by Fresnel's equations. Its shape should be closed; the normal points out of the glass. It blocks the straight way to lights: behind it, path finds that of lamps and suns that have a size (caustics), not that of mere points; whitted finds it where it has transparent_shadows.
 ---@param keys? tessera.GlassKeys
 ---@return tessera.Material
 function tessera.glass(keys) end

@@ -52,7 +52,7 @@ fn gathered(scene: &Scene) -> Caustics {
 /// Those that arrive, in order, of those with these numbers.
 fn sent(scene: &Scene, sources: &Sources, numbers: Range<u64>) -> Vec<Photon> {
     let batches = (numbers.end - numbers.start) / BATCH;
-    let batch = |batch: u64| scene.run(Batch { sources, first: numbers.start + batch * BATCH, max_bounces: MOST_BOUNCES });
+    let batch = |batch: u64| scene.run(Batch { sources, first: numbers.start + batch * BATCH });
     (0..batches).into_par_iter().map(batch).collect::<Vec<_>>().concat()
 }
 
@@ -60,7 +60,6 @@ fn sent(scene: &Scene, sources: &Sources, numbers: Range<u64>) -> Vec<Photon> {
 struct Batch<'s> {
     sources: &'s Sources<'s>,
     first: u64,
-    max_bounces: u32,
 }
 
 impl Work for Batch<'_> {
@@ -78,7 +77,7 @@ impl Batch<'_> {
     fn photon(&self, scene: impl Tracer, sampler: &Sampler) -> Option<Photon> {
         let Departing { origin, direction, mut flux, begin } = self.sources.depart(sampler)?;
         let (mut ray, mut inside, mut caster) = (Ray::new(origin, direction), Inside::default(), None);
-        for bounce in 0..=self.max_bounces {
+        for bounce in 0..=MOST_BOUNCES {
             let surface = scene.closest(&ray)?;
             let material = &scene.materials[surface.material as usize];
             if matches!(material.recipe, Recipe::Nothing) {

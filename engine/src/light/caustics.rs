@@ -15,7 +15,7 @@ use glam::{DVec2, DVec3};
 
 use crate::shape::Bounds;
 use octahedron::{folded, unfolded};
-pub use source::{Ball, Begin, Departing, Sources};
+pub use source::{Begin, Departing, Sources};
 use squares::Squares;
 
 /// Light on its way from a light over mirrors and lenses, where it meets a surface that scatters it.

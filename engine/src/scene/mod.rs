@@ -1,6 +1,5 @@
 //! The compiled scene: all that a frame's rays need, immutable and shared by all threads.
 
-mod casters;
 mod compile;
 mod directions;
 mod emitters;
@@ -108,8 +107,8 @@ impl Scene {
 
     /// Lights whose light something in the scene may gather, and these things; `None` if there are none.
     pub fn gathered(&self) -> Option<Sources<'_>> {
-        let casters = casters::casters(&self.geometry, &self.materials);
-        Sources::new(&self.light_sampler, &self.environment, casters, self.geometry.bounds?)
+        let boxes = self.geometry.boxes(|material| self.materials[material as usize].recipe.gathers());
+        Sources::new(&self.light_sampler, &self.environment, boxes, self.geometry.bounds?)
     }
 
     /// Lowest and highest coordinates, in the world, of all finite things.

@@ -21,13 +21,22 @@ const AIMED: f64 = 0.75;
 /// Most targets.
 const MOST_TARGETS: usize = 1 << 10;
 
-/// A ball around something that gathers light.
+/// A ball around something.
 #[derive(Clone, Copy, Debug)]
-pub struct Ball {
-    /// Its middle.
-    pub center: DVec3,
-    /// Its radius, above 0.
-    pub radius: f64,
+struct Ball {
+    center: DVec3,
+    radius: f64,
+}
+
+impl Ball {
+    /// The smallest around a box.
+    fn around(Bounds { min, max }: Bounds) -> Self {
+        Self { center: (min + max) * 0.5, radius: (max - min).length() * 0.5 }
+    }
+
+    fn is_some(&self) -> bool {
+        self.radius > 0.0 && self.radius.is_finite() && self.center.is_finite()
+    }
 }
 
 /// Where photons come from and go to. Only lights that rays may find by chance send them.
@@ -93,8 +102,10 @@ impl<'s> Sources<'s> {
     /// The first set of numbers of a sampler that [`Self::depart`] does not use.
     pub const SETS: u32 = set::PAIR + set::COUNT;
 
-    /// Of the lights of a scene within some bounds, and what may gather their light. `None` if there are no such lights or no targets.
-    pub fn new(lights: &'s LightSampler, environment: &'s Environment, mut targets: Vec<Ball>, bounds: Bounds) -> Option<Self> {
+    /// Of the lights of a scene within some bounds, and boxes around what may gather their light, of which infinite ones are left out. `None` if there are no such lights or no targets.
+    pub fn new(lights: &'s LightSampler, environment: &'s Environment, boxes: Vec<Bounds>, bounds: Bounds) -> Option<Self> {
+        let mut targets: Vec<_> = boxes.into_iter().map(Ball::around).filter(Ball::is_some).collect();
+        let whole = Some(Ball::around(bounds)).filter(|whole| whole.is_some() && !targets.is_empty())?;
         targets.sort_by(|a, b| b.radius.total_cmp(&a.radius));
         targets.truncate(MOST_TARGETS);
         let mut emitters: Vec<_> = lights.emitters.iter().collect();
@@ -107,7 +118,6 @@ impl<'s> Sources<'s> {
         if matches!(environment, Environment::Image(_)) {
             origins.push(Origin::Environment);
         }
-        let whole = Ball { center: (bounds.min + bounds.max) * 0.5, radius: (bounds.max - bounds.min).length() };
         let pairs: Vec<_> = origins.iter().flat_map(|&origin| targets.iter().map(move |&target| Pair { origin, target })).collect();
         let mut sum = 0.0;
         let mut up_to = |pair: &Pair| {
@@ -115,17 +125,10 @@ impl<'s> Sources<'s> {
             sum
         };
         let sums: Vec<_> = pairs.iter().map(&mut up_to).collect();
-        (sum > 0.0 && sum.is_finite() && whole.radius.is_finite()).then_some(Self {
-            environment,
-            whole,
-            pairs,
-            sums,
-            aims: Vec::new(),
-            squares: Squares::default(),
-        })
+        (sum > 0.0 && sum.is_finite()).then_some(Self { environment, whole, pairs, sums, aims: Vec::new(), squares: Squares::default() })
     }
 
-    /// The same, but half of the photons go where others have been of use: each with its worth, not negative.
+    /// The same, but most photons go where others have been of use: each of these with its worth, not negative.
     #[must_use]
     pub fn aimed(self, photons: impl Iterator<Item = (Begin, f64)>) -> Self {
         let mut photons: Vec<_> = photons.filter(|(_, worth)| *worth > 0.0).collect();
