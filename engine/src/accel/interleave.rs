@@ -52,7 +52,7 @@ impl Turn {
         self.leaf_count += usize::from(is_leaf);
         let (base, size) =
             if is_leaf { (packs.as_ptr().cast::<u8>(), size_of::<Pack>()) } else { (nodes.as_ptr().cast(), size_of::<Node>()) };
-        prefetch(base.wrapping_add((current & !LEAF) as usize * size));
+        prefetch::<4>(base.wrapping_add((current & !LEAF) as usize * size));
     }
 }
 

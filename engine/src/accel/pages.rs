@@ -1,10 +1,12 @@
 //! Memory for large trees: in large pages, where the system has them, so that a walk does not wait for addresses to be translated.
 
-/// The same values, in memory of their own that is as large as they are.
-pub fn settle<T: Copy>(from: Vec<T>) -> Vec<T> {
+use rayon::prelude::*;
+
+/// The same values, in memory of their own that is as large as they are. All threads of the caller's pool copy: a system takes long to hand out pages.
+pub fn settle<T: Copy + Send + Sync>(from: Vec<T>) -> Vec<T> {
     let mut to = Vec::with_capacity(from.len());
     ask_for_large_pages(&mut to);
-    to.extend_from_slice(&from);
+    to.par_extend(from.par_iter().with_min_len((1 << 20) / size_of::<T>()));
     to
 }
 
@@ -26,11 +28,11 @@ fn ask_for_large_pages<T>(memory: &mut Vec<T>) {
 #[cfg(not(target_os = "linux"))]
 fn ask_for_large_pages<T>(_: &mut Vec<T>) {}
 
-/// Asks memory for the four lines of the processor's cache that begin with `at`, which need not be there.
+/// Asks memory for some lines of the processor's cache, which begin with `at` and need not be there.
 #[inline(always)]
-pub fn prefetch(at: *const u8) {
+pub fn prefetch<const LINES: usize>(at: *const u8) {
     #[cfg(target_arch = "x86_64")]
-    for line in 0..4 {
+    for line in 0..LINES {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         // SAFETY: it reads nothing.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(at.wrapping_add(64 * line).cast()) };

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::frame::Normalisation;
+use super::{frame::Normalisation, pages::prefetch};
 use crate::shape::{
     Bounds, Ray,
     triangle::{Sheared, TriangleHit},
@@ -54,6 +54,18 @@ impl Triangles {
     #[inline(always)]
     pub fn vertices(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// Asks memory for the indices of a triangle.
+    #[inline(always)]
+    pub fn prefetch_indices(&self, triangle: u32) {
+        prefetch::<1>(self.triangles.as_ptr().wrapping_add(triangle as usize).cast());
+    }
+
+    /// Asks memory for its vertices.
+    #[inline(always)]
+    pub fn prefetch_vertices(&self, triangle: u32) {
+        self.triangles[triangle as usize].iter().for_each(|i| prefetch::<1>(self.positions.as_ptr().wrapping_add(*i as usize).cast()));
     }
 
     /// Where a ray in the mesh's coordinates hits a triangle, with `t > 0`: the same bits as packs find.

@@ -57,15 +57,14 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         surface: &Surface,
         shading: &Shading,
         walk: &Walk,
-        sampler: &Sampler,
         sets: u32,
     ) -> DVec3 {
         let sets = set::GATHERED + sets;
         let sent = sent(walk.throughput);
-        if sampler.one(sets + set::LIGHT) >= sent {
+        if walk.sampler.one(sets + set::LIGHT) >= sent {
             return DVec3::ZERO;
         }
-        let proposed = caustics.sample(surface.point, sampler.one(sets + set::PLACE), sampler.pair(sets + set::PLACE));
+        let proposed = caustics.sample(surface.point, walk.sampler.one(sets + set::PLACE), walk.sampler.pair(sets + set::PLACE));
         let Some((direction, density)) = proposed else { return DVec3::ZERO };
         let (f, pdf) = shading.evaluate(direction);
         if f == DVec3::ZERO {
@@ -77,12 +76,12 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         }
         let throughput = f / (sent * density + pdf);
         let begun = Walk { ray: surface.spawn(direction), depth: walk.depth + 1, throughput, inside, ..*walk };
-        self.follow(scene, begun, sampler)
+        self.follow(scene, begun)
     }
 
     /// What a ray finds over mirrors and lenses alone, at least one.
     #[inline(always)]
-    fn follow(&mut self, scene: impl Tracer, mut walk: Walk, sampler: &Sampler) -> DVec3 {
+    fn follow(&mut self, scene: impl Tracer, mut walk: Walk) -> DVec3 {
         let (mut found, mut gathered) = (DVec3::ZERO, false);
         for passed in 0..MOST_PASSED {
             self.counts.secondary += 1;
@@ -92,7 +91,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             }
             if MEDIA && let Some(medium) = walk.inside.medium(&scene) {
                 let distance = met.as_ref().map_or(f64::INFINITY, |surface| surface.t);
-                let Travel::Arrives(weight) = medium.travel(distance, sampler.pair(set::GATHERED + set::PASSED + passed)) else { break };
+                let Travel::Arrives(weight) = medium.travel(distance, walk.sampler.pair(set::GATHERED + set::PASSED + passed)) else { break };
                 walk.throughput *= weight;
             }
             let Some(surface) = met else {
@@ -113,7 +112,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             }
             let shading = Shading::new(bsdf, turn, &scene, material, &surface, walk.ray.direction);
             let sets = set::GATHERED + Sampler::FIRST_FREE + walk.depth * set::COUNT;
-            let Some((scattered, direction)) = shading.sample(sampler.one(sets + set::LOBE), sampler.pair(sets + set::SCATTER)) else {
+            let Some((scattered, direction)) = shading.sample(walk.sampler.one(sets + set::LOBE), walk.sampler.pair(sets + set::SCATTER)) else {
                 break;
             };
             if !scattered.specular {

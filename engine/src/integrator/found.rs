@@ -78,25 +78,9 @@ pub fn power_heuristic(pdf: f64, other: f64) -> f64 {
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// What of the light that a ray is sent for gets to its start, which is `inside` of something.
-#[inline(always)]
-pub fn arriving<const MEDIA: bool>(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &Inside) -> DVec3 {
-    if MEDIA {
-        return arriving.light * through_media(scene, arriving, ray, inside);
-    }
-    if let Some(emitter) = arriving.textured {
-        return arriving.light * looked_up(scene, emitter, ray);
-    }
-    let blocked = match arriving.delta {
-        Some(light) => scene.any_before_light(light as usize, ray, |_, _| true),
-        None => scene.any(ray, |_, _| true),
-    };
-    if blocked { DVec3::ZERO } else { arriving.light }
-}
-
 /// Radiance of an emitter that a ray is sent to, if nothing stands before it.
 #[inline(never)]
-fn looked_up(scene: impl Tracer, emitter: u32, ray: &Ray) -> DVec3 {
+pub fn looked_up(scene: impl Tracer, emitter: u32, ray: &Ray) -> DVec3 {
     let endless = Ray { t_max: f64::INFINITY, ..*ray };
     scene.closest(&endless).map_or(DVec3::ZERO, |surface| shown(scene, emitter, &surface, ray.direction))
 }
@@ -111,7 +95,7 @@ fn shown(scene: impl Tracer, emitter: u32, surface: &Surface, direction: DVec3) 
 
 /// The share of light that gets through media and borders that do not show, or what an emitter shows through them.
 #[inline(never)]
-fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &Inside) -> DVec3 {
+pub fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &Inside) -> DVec3 {
     let (mut ray, mut inside, mut share) = (*ray, *inside, DVec3::ONE);
     for _ in 0..MOST_PASSED {
         let t_max = if arriving.textured.is_some() { f64::INFINITY } else { ray.t_max };

@@ -22,8 +22,8 @@ use crate::{sampling::Sampler, scene::Tracer, shape::Ray};
 
 /// A way to follow light. It may keep memory from ray to ray, but what it computes depends on scene, ray and sample alone.
 pub trait Integrator {
-    /// Radiance that arrives along a ray from the camera.
-    fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3;
+    /// Radiance that arrives along rays from the camera, of each in its place: many at a time, as trees are walked faster by many.
+    fn radiance(&mut self, scene: impl Tracer, rays: &[Ray], samplers: &[Sampler], radiance: &mut [DVec3]);
 
     /// Rays traced so far, besides those from the camera.
     fn counts(&self) -> RayCounts;

@@ -12,7 +12,7 @@ use crate::{
     light::{Arriving, Caustics, Vertex},
     material::{Bsdf, Material, Medium, MetallicRoughness, Recipe, Scattered, Travel},
     sampling::Sampler,
-    scene::{Inside, Scene, Tracer},
+    scene::{Hit, Inside, Scene, Tracer},
     shape::{Ray, Surface},
 };
 
@@ -29,6 +29,29 @@ pub struct Path<'s, const MEDIA: bool> {
     /// Where light is gathered, if anywhere.
     pub(super) caustics: Option<&'s Caustics>,
     pub(super) counts: RayCounts,
+    walks: Vec<Walk>,
+    rays: Vec<Ray>,
+    hits: Vec<Option<Hit>>,
+    sought: Sought,
+}
+
+/// Light of lights that arrives where paths met something, unless something stands before it.
+#[derive(Debug, Default)]
+struct Sought {
+    /// Towards the lights.
+    rays: Vec<Ray>,
+    light: Vec<Light>,
+}
+
+/// Light that arrives along one of the rays.
+#[derive(Clone, Copy, Debug)]
+struct Light {
+    /// Radiance in the pixel.
+    radiance: DVec3,
+    /// The path that it belongs to.
+    number: u32,
+    /// Index among the lights without extent, if it is one of these.
+    delta: Option<u32>,
 }
 
 /// What a sample's numbers are for, at every vertex; sets before these belong to film and lens.
@@ -56,7 +79,11 @@ pub(super) const MOST_PASSED: u32 = 10_000;
 const LEAST_SURVIVAL: f64 = 1.0 / 256.0;
 
 /// A path as far as it is known.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Walk {
+    /// Which of the paths that are followed together.
+    pub(super) number: u32,
+    pub(super) sampler: Sampler,
     pub(super) ray: Ray,
     /// Rays so far.
     pub(super) depth: u32,
@@ -74,9 +101,30 @@ pub(super) struct Walk {
     pub(super) joint: Option<[Inside; 2]>,
     /// The set of numbers for what happens on the way to the next surface: one for each way, as several lead through media in turn.
     pub(super) travel: u32,
+    /// Surfaces without effect that it went through.
+    pub(super) passed: u32,
 }
 
 impl Walk {
+    /// From the camera.
+    #[inline(always)]
+    fn new(number: usize, ray: &Ray, sampler: &Sampler, inside: Inside) -> Self {
+        Self {
+            number: number as u32,
+            sampler: *sampler,
+            ray: *ray,
+            depth: 1,
+            throughput: DVec3::ONE,
+            compression: 1.0,
+            last: None,
+            chain: None,
+            inside,
+            joint: None,
+            travel: Sampler::FIRST_FREE + set::TRAVEL,
+            passed: 0,
+        }
+    }
+
     /// Whether the ray's direction was the only one.
     #[inline(always)]
     pub(super) fn is_after_mirror(&self) -> bool {
@@ -116,71 +164,49 @@ enum Next {
 impl<'s, const MEDIA: bool> Path<'s, MEDIA> {
     /// With the settings of [`crate::description::Render::Path`], and what is known of where light is gathered.
     pub fn new(max_depth: u32, roulette_depth: u32, smooth_terminator: bool, caustics: Option<&'s Caustics>) -> Self {
-        Self { max_depth, roulette_depth, smooth_terminator, caustics, counts: RayCounts::default() }
+        Self {
+            max_depth,
+            roulette_depth,
+            smooth_terminator,
+            caustics,
+            counts: RayCounts::default(),
+            walks: Vec::new(),
+            rays: Vec::new(),
+            hits: Vec::new(),
+            sought: Sought::default(),
+        }
     }
 }
 
 impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
     #[inline(always)]
-    fn radiance(&mut self, scene: impl Tracer, ray: &Ray, sampler: &Sampler) -> DVec3 {
-        let mut radiance = DVec3::ZERO;
-        let travel = Sampler::FIRST_FREE + set::TRAVEL;
-        let mut walk = Walk {
-            ray: *ray,
-            depth: 1,
-            throughput: DVec3::ONE,
-            compression: 1.0,
-            last: None,
-            chain: None,
-            inside: scene.around_eye,
-            joint: None,
-            travel,
-        };
-        let mut passed = 0;
+    fn radiance(&mut self, scene: impl Tracer, rays: &[Ray], samplers: &[Sampler], radiance: &mut [DVec3]) {
+        let mut walks = std::mem::take(&mut self.walks);
+        walks.extend(rays.iter().zip(samplers).enumerate().map(|(number, (ray, sampler))| Walk::new(number, ray, sampler, scene.around_eye)));
+        self.hits.clear();
+        scene.hits_from_eye(rays, |_, hit| self.hits.push(hit));
         loop {
-            let mut met = if walk.depth == 1 && passed == 0 { scene.closest_from_eye(&walk.ray) } else { scene.closest(&walk.ray) };
-            if let Some(surface) = met.as_mut().filter(|_| self.smooth_terminator || MEDIA) {
-                self.look_closer(scene, surface, &mut walk);
-            }
-            let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
-            let next = match self.scattered_on_the_way(scene, &mut walk, met.as_ref(), sampler, sets, &mut radiance) {
-                Some(next) => next,
-                None => match &met {
-                    None => {
-                        radiance += walk.throughput * found::leaving(scene, walk.ray.direction, walk.last.as_ref()) * self.share(&walk);
-                        Next::Ends
-                    }
-                    Some(surface) => self.meet(scene, surface, &mut walk, sampler, sets, &mut radiance),
-                },
-            };
-            match (next, &met) {
-                (Next::Along(scattered, direction, vertex), _) => {
-                    if self.caustics.is_some() && !scattered.specular {
-                        walk.chain = vertex.normal.map(|_| Chain {
-                            point: vertex.point,
-                            direction,
-                            pdf: scattered.pdf,
-                            sent: chain::sent(walk.throughput),
-                        });
-                    }
-                    if !self.goes_on(&mut walk, &scattered, vertex, sampler, sets) {
-                        return radiance;
-                    }
-                    walk.ray = match (&met, vertex.normal) {
-                        (Some(surface), Some(_)) => surface.spawn(direction),
-                        _ => Ray::new(vertex.point, direction),
-                    };
+            let mut left = 0;
+            for number in 0..walks.len() {
+                let walk = &mut walks[number];
+                scene.prefetch(&self.hits, number);
+                let met = self.hits[number].and_then(|hit| scene.surface(&walk.ray, &hit));
+                if self.advance(scene, walk, met, &mut radiance[walk.number as usize]) {
+                    walks[left] = walks[number];
+                    left += 1;
                 }
-                (Next::Passes, Some(surface)) if passed < MOST_PASSED => {
-                    walk.travel = set::PASSED + passed;
-                    passed += 1;
-                    walk.inside = walk.beyond::<MEDIA>(surface, walk.ray.direction);
-                    walk.ray = surface.spawn(walk.ray.direction);
-                    walk.last.iter_mut().for_each(|last| last.distance += surface.t);
-                }
-                _ => return radiance,
             }
+            walks.truncate(left);
+            self.arrive(scene, radiance);
+            if walks.is_empty() {
+                break;
+            }
+            self.rays.clear();
+            self.rays.extend(walks.iter().map(|walk| walk.ray));
+            self.hits.clear();
+            scene.hits(&self.rays, |_, hit| self.hits.push(hit));
         }
+        self.walks = walks;
     }
 
     fn counts(&self) -> RayCounts {
@@ -189,6 +215,65 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
 }
 
 impl<const MEDIA: bool> Path<'_, MEDIA> {
+    /// Follows a path from where its ray met something, if it did; whether it goes on.
+    #[inline(always)]
+    fn advance(&mut self, scene: impl Tracer, walk: &mut Walk, mut met: Option<Surface>, radiance: &mut DVec3) -> bool {
+        if let Some(surface) = met.as_mut().filter(|_| self.smooth_terminator || MEDIA) {
+            self.look_closer(scene, surface, walk);
+        }
+        let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
+        let next = match self.scattered_on_the_way(scene, walk, met.as_ref(), sets, radiance) {
+            Some(next) => next,
+            None => match &met {
+                None => {
+                    *radiance += walk.throughput * found::leaving(scene, walk.ray.direction, walk.last.as_ref()) * self.share(walk);
+                    Next::Ends
+                }
+                Some(surface) => self.meet(scene, surface, walk, sets, radiance),
+            },
+        };
+        match (next, &met) {
+            (Next::Along(scattered, direction, vertex), _) => {
+                if self.caustics.is_some() && !scattered.specular {
+                    walk.chain = vertex.normal.map(|_| Chain {
+                        point: vertex.point,
+                        direction,
+                        pdf: scattered.pdf,
+                        sent: chain::sent(walk.throughput),
+                    });
+                }
+                walk.ray = match (&met, vertex.normal) {
+                    (Some(surface), Some(_)) => surface.spawn(direction),
+                    _ => Ray::new(vertex.point, direction),
+                };
+                self.goes_on(walk, &scattered, vertex, sets)
+            }
+            (Next::Passes, Some(surface)) if walk.passed < MOST_PASSED => {
+                walk.travel = set::PASSED + walk.passed;
+                walk.passed += 1;
+                walk.inside = walk.beyond::<MEDIA>(surface, walk.ray.direction);
+                walk.ray = surface.spawn(walk.ray.direction);
+                walk.last.iter_mut().for_each(|last| last.distance += surface.t);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// Adds the light that was sought and that nothing stands before.
+    #[inline(always)]
+    fn arrive(&mut self, scene: impl Tracer, radiance: &mut [DVec3]) {
+        let Sought { rays, light } = &mut self.sought;
+        let towards = |ray: usize| light[ray].delta.map(|delta| delta as usize);
+        scene.any_of(rays, towards, |_, _, _| true, |ray, is_blocked| {
+            if !is_blocked {
+                radiance[light[ray].number as usize] += light[ray].radiance;
+            }
+        });
+        rays.clear();
+        light.clear();
+    }
+
     /// Looks for what a ray does not tell that meets a surface: other faces in the same place, and the smooth surface that a coarse one stands for.
     #[inline(always)]
     pub(super) fn look_closer(&self, scene: impl Tracer, surface: &mut Surface, walk: &mut Walk) {
@@ -204,7 +289,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
 
     /// Adds what a surface shows by itself and what it scatters once, and chooses where the path goes on.
     #[inline(always)]
-    fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sampler: &Sampler, sets: u32, radiance: &mut DVec3) -> Next {
+    fn meet(&mut self, scene: impl Tracer, surface: &Surface, walk: &mut Walk, sets: u32, radiance: &mut DVec3) -> Next {
         let material = &scene.materials[surface.material as usize];
         let direction = walk.ray.direction;
         if let Some(emission) = &material.emission {
@@ -219,13 +304,13 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         let vertex = Vertex { point: surface.point, normal: Some(surface.ng) };
         if !shading.bsdf.is_specular() {
             let evaluate = |direction| shading.evaluate(direction);
-            *radiance += walk.throughput * self.direct(scene, Some(surface), walk, &vertex, sampler, sets, evaluate);
+            *radiance += self.direct(scene, Some(surface), walk, &vertex, sets, evaluate);
             if let Some(caustics) = self.caustics {
-                *radiance += walk.throughput * self.gathered(scene, caustics, surface, &shading, walk, sampler, sets);
+                *radiance += walk.throughput * self.gathered(scene, caustics, surface, &shading, walk, sets);
             }
         }
-        let pick = if shading.bsdf.has_lobes() { sampler.one(sets + set::LOBE) } else { 0.0 };
-        let Some((scattered, direction)) = shading.sample(pick, sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
+        let pick = if shading.bsdf.has_lobes() { walk.sampler.one(sets + set::LOBE) } else { 0.0 };
+        let Some((scattered, direction)) = shading.sample(pick, walk.sampler.pair(sets + set::SCATTER)) else { return Next::Ends };
         if scattered.transmitted && material.recipe.has_inside() {
             walk.inside = walk.beyond::<MEDIA>(surface, direction);
         }
@@ -239,7 +324,6 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         scene: impl Tracer,
         walk: &mut Walk,
         met: Option<&Surface>,
-        sampler: &Sampler,
         sets: u32,
         radiance: &mut DVec3,
     ) -> Option<Next> {
@@ -248,7 +332,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         }
         let medium = walk.inside.medium(&scene)?;
         let distance = met.map_or(f64::INFINITY, |surface| surface.t);
-        let u = if medium.scatters() { sampler.pair(walk.travel) } else { DVec2::ZERO };
+        let u = if medium.scatters() { walk.sampler.pair(walk.travel) } else { DVec2::ZERO };
         match medium.travel(distance, u) {
             Travel::Arrives(weight) => {
                 walk.throughput *= weight;
@@ -259,7 +343,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                 if walk.depth == self.max_depth {
                     return Some(Next::Ends);
                 }
-                Some(self.scatter_in(scene, medium, walk, walk.ray.at(way), sampler, sets, radiance))
+                Some(self.scatter_in(scene, medium, walk, walk.ray.at(way), sets, radiance))
             }
         }
     }
@@ -273,7 +357,6 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         medium: &Medium,
         walk: &Walk,
         point: DVec3,
-        sampler: &Sampler,
         sets: u32,
         radiance: &mut DVec3,
     ) -> Next {
@@ -283,14 +366,14 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             let pdf = medium.phase(along.dot(direction));
             (DVec3::splat(pdf), pdf)
         };
-        *radiance += walk.throughput * self.direct(scene, None, walk, &vertex, sampler, sets, evaluate);
-        let (direction, pdf) = medium.scatter(along, sampler.pair(sets + set::SCATTER));
+        *radiance += self.direct(scene, None, walk, &vertex, sets, evaluate);
+        let (direction, pdf) = medium.scatter(along, walk.sampler.pair(sets + set::SCATTER));
         Next::Along(Scattered { transmitted: true, ..Scattered::reflected(direction, DVec3::ONE, pdf) }, direction, vertex)
     }
 
     /// Makes a path one ray longer, unless chance or a weight of 0 ends it.
     #[inline(always)]
-    fn goes_on(&mut self, walk: &mut Walk, scattered: &Scattered, vertex: Vertex, sampler: &Sampler, sets: u32) -> bool {
+    fn goes_on(&mut self, walk: &mut Walk, scattered: &Scattered, vertex: Vertex, sets: u32) -> bool {
         let Scattered { weight, pdf, specular, eta2, .. } = *scattered;
         walk.throughput *= weight;
         walk.compression *= eta2;
@@ -298,7 +381,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             // The root: between ending as much as a path has lost, which costs the least time, and never, which adds the least noise.
             let survival = (walk.throughput * walk.compression).max_element().sqrt().max(LEAST_SURVIVAL);
             if survival < 1.0 {
-                if sampler.one(sets + set::ROULETTE) >= survival {
+                if walk.sampler.one(sets + set::ROULETTE) >= survival {
                     return false;
                 }
                 walk.throughput *= 1.0 / survival;
@@ -311,7 +394,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         walk.throughput != DVec3::ZERO
     }
 
-    /// Light that comes straight from lights and is scattered once, as `evaluate` says.
+    /// Seeks light that comes straight from lights and is scattered once, as `evaluate` says; what of it is known at once.
     #[inline(always)]
     #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
     fn direct(
@@ -320,20 +403,19 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         surface: Option<&Surface>,
         walk: &Walk,
         vertex: &Vertex,
-        sampler: &Sampler,
         sets: u32,
         evaluate: impl Fn(DVec3) -> (DVec3, f64),
     ) -> DVec3 {
         let lights = &scene.light_sampler;
         let mut radiance = DVec3::ZERO;
         if lights.has_local() {
-            let pick = if lights.picks_local() { sampler.one(sets + set::LIGHT) } else { 0.0 };
-            if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, sampler.pair(sets + set::PLACE)) {
+            let pick = if lights.picks_local() { walk.sampler.one(sets + set::LIGHT) } else { 0.0 };
+            if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, walk.sampler.pair(sets + set::PLACE)) {
                 radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
         if lights.has_distant() {
-            let (pick, u) = (sampler.one(sets + set::DISTANT), sampler.pair(sets + set::DIRECTION));
+            let (pick, u) = (walk.sampler.one(sets + set::DISTANT), walk.sampler.pair(sets + set::DIRECTION));
             if let Some(arriving) = lights.sample_distant(&scene.lights, &scene.environment, vertex, pick, u) {
                 radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
             }
@@ -341,7 +423,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         radiance
     }
 
-    /// What is passed on of light that arrives, if nothing stands between.
+    /// Seeks light that arrives, if nothing stands between, and is passed on; what of it is known at once.
     #[inline(always)]
     fn scattered(
         &mut self,
@@ -365,11 +447,20 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             None => Ray { t_max: arriving.distance, ..Ray::new(vertex.point, arriving.direction) },
         };
         self.counts.shadow += 1;
-        let mut inside = walk.inside;
-        if let Some(surface) = surface.filter(|surface| MEDIA && goes_through(scene, surface, walk.ray.direction, ray.direction)) {
-            inside = walk.beyond::<MEDIA>(surface, ray.direction);
+        let light = walk.throughput * f * weight * arriving.light;
+        if MEDIA {
+            let mut inside = walk.inside;
+            if let Some(surface) = surface.filter(|surface| goes_through(scene, surface, walk.ray.direction, ray.direction)) {
+                inside = walk.beyond::<MEDIA>(surface, ray.direction);
+            }
+            return light * found::through_media(scene, arriving, &ray, &inside);
         }
-        f * found::arriving::<MEDIA>(scene, arriving, &ray, &inside) * weight
+        if let Some(emitter) = arriving.textured {
+            return light * found::looked_up(scene, emitter, &ray);
+        }
+        self.sought.rays.push(ray);
+        self.sought.light.push(Light { radiance: light, number: walk.number, delta: arriving.delta });
+        DVec3::ZERO
     }
 }
 

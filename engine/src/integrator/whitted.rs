@@ -9,7 +9,7 @@ use crate::{
         dielectric::{interface, reflect},
     },
     sampling::Sampler,
-    scene::Tracer,
+    scene::{Hit, Tracer},
     shape::{Ray, Surface},
 };
 
@@ -22,6 +22,7 @@ pub struct Whitted {
     max_depth: u32,
     transparent_shadows: bool,
     min_weight: f64,
+    hits: Vec<Option<Hit>>,
     waiting: Vec<Branch>,
     counts: RayCounts,
 }
@@ -39,17 +40,33 @@ struct Branch {
 impl Whitted {
     /// With the settings of [`crate::description::Render::Whitted`].
     pub fn new(max_depth: u32, transparent_shadows: bool, min_weight: f64) -> Self {
-        Self { max_depth, transparent_shadows, min_weight, waiting: Vec::new(), counts: RayCounts::default() }
+        Self { max_depth, transparent_shadows, min_weight, hits: Vec::new(), waiting: Vec::new(), counts: RayCounts::default() }
     }
 }
 
 impl Integrator for Whitted {
     #[inline(always)]
-    fn radiance(&mut self, scene: impl Tracer, ray: &Ray, _: &Sampler) -> DVec3 {
+    fn radiance(&mut self, scene: impl Tracer, rays: &[Ray], _: &[Sampler], radiance: &mut [DVec3]) {
+        self.hits.clear();
+        scene.hits_from_eye(rays, |_, hit| self.hits.push(hit));
+        for (number, ray) in rays.iter().enumerate() {
+            scene.prefetch(&self.hits, number);
+            radiance[number] = self.followed(scene, ray, self.hits[number].and_then(|hit| scene.surface(ray, &hit)));
+        }
+    }
+
+    fn counts(&self) -> RayCounts {
+        self.counts
+    }
+}
+
+impl Whitted {
+    /// Radiance along a ray, by what it meets first.
+    #[inline(always)]
+    fn followed(&mut self, scene: impl Tracer, ray: &Ray, mut met: Option<Surface>) -> DVec3 {
         let mut radiance = DVec3::ZERO;
         let mut branch = Branch { ray: *ray, weight: DVec3::ONE, depth: 1 };
         loop {
-            let met = if branch.depth == 1 { scene.closest_from_eye(&branch.ray) } else { scene.closest(&branch.ray) };
             let goes_on = match &met {
                 None => {
                     radiance += branch.weight * scene.environment.radiance(branch.ray.direction);
@@ -63,15 +80,10 @@ impl Integrator for Whitted {
                     None => return radiance,
                 }
             }
+            met = scene.closest(&branch.ray);
         }
     }
 
-    fn counts(&self) -> RayCounts {
-        self.counts
-    }
-}
-
-impl Whitted {
     /// Adds what the end of a branch shows by itself to the radiance, and turns the branch, where it stands, into the one to follow next, if there is
     /// one; another is left waiting.
     #[inline(always)]

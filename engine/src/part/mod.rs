@@ -4,9 +4,11 @@ mod aovs;
 mod canary;
 mod counters;
 mod pairwise;
+mod pixels;
 mod render;
 mod rendered;
 mod spread;
+mod wave;
 #[cfg(test)]
 mod aovs_tests;
 #[cfg(test)]

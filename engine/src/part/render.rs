@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DVec2, DVec3};
 
-use super::{Cancelled, Counters, PairwiseSum, Rect, RenderedPart, SampleRange, aovs, spread::Spread};
+use super::{Cancelled, Counters, Rect, RenderedPart, SampleRange, aovs, pixels::Pixels, wave::Wave};
 use crate::{
     description::{Aov, Render},
     integrator::{self, Integrator, Path, Raycast, Whitted, caustics},
@@ -21,7 +21,7 @@ pub fn prepared(scene: Scene) -> Scene {
     scene
 }
 
-/// Renders the samples of a range in every pixel of a rectangle. A pixel is the mean of its samples, summed by [`PairwiseSum`]. A sample that is
+/// Renders the samples of a range in every pixel of a rectangle. A pixel is the mean of its samples, summed by [`super::PairwiseSum`]. A sample that is
 /// invalid (a component is negative or no finite number) counts as black, so that it cannot spoil the pixel, and is counted. What the frame tells beside
 /// colours comes along.
 ///
@@ -80,16 +80,17 @@ struct Traced {
 
 fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicBool) -> Result<Traced, Cancelled> {
     match scene.render {
-        Render::Raycast => scene.run(Tracing::new(Raycast, lattice, samples, cancel)),
+        Render::Raycast => scene.run(Tracing::new(scene, Raycast::default(), lattice, samples, cancel)),
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
-            scene.run(Tracing::new(Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
+            scene.run(Tracing::new(scene, Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
         }
         Render::Path { max_depth, roulette_depth, smooth_terminator } => {
             let caustics = caustics(scene);
             if scene.has_media() {
-                scene.run(Tracing::new(Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics), lattice, samples, cancel))
+                scene.run(Tracing::new(scene, Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics), lattice, samples, cancel))
             } else {
                 scene.run(Tracing::new(
+                    scene,
                     Path::<false>::new(max_depth, roulette_depth, smooth_terminator, caustics),
                     lattice,
                     samples,
@@ -104,12 +105,9 @@ struct Tracing<'c, I> {
     integrator: I,
     lattice: Lattice,
     samples: SampleRange,
-    /// Of one sample in the mean.
-    share: f64,
     cancel: &'c AtomicBool,
-    sum: PairwiseSum,
-    /// Where errors are asked for.
-    spread: Option<Box<Spread>>,
+    wave: Wave,
+    pixels: Pixels,
     counters: Counters,
 }
 
@@ -118,59 +116,49 @@ impl<I: Integrator> Work for Tracing<'_, I> {
 
     #[inline(always)]
     fn run(mut self, scene: impl Tracer) -> Self::Output {
-        self.spread = scene.aovs.contains(Aov::Error).then(Box::default);
-        let mut errors = Vec::new();
-        let mut pixels = Vec::with_capacity(self.lattice.rows().size_hint().0 * self.lattice.columns().size_hint().0);
         for y in self.lattice.rows() {
             if self.cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
             for x in self.lattice.columns() {
-                let pixel = self.pixel(scene, (x, y));
-                pixels.push(pixel);
-                errors.extend(self.spread.as_ref().map(|spread| spread.standard_error()));
+                for index in self.samples.first..self.samples.first + self.samples.count {
+                    self.wave.push(&scene, (x, y), index);
+                    if self.wave.is_full() {
+                        self.trace(scene);
+                    }
+                }
             }
         }
+        self.trace(scene);
         let rays = self.integrator.counts();
         let counters = Counters { shadow_rays: rays.shadow, secondary_rays: rays.secondary, ..self.counters };
-        Ok(Traced { pixels, errors, counters })
+        Ok(Traced { pixels: self.pixels.means, errors: self.pixels.errors, counters })
     }
 }
 
 impl<'c, I: Integrator> Tracing<'c, I> {
-    fn new(integrator: I, lattice: Lattice, samples: SampleRange, cancel: &'c AtomicBool) -> Self {
-        let share = 1.0 / samples.count as f64;
-        Self { integrator, lattice, samples, share, cancel, sum: PairwiseSum::default(), spread: None, counters: Counters::default() }
+    fn new(scene: &Scene, integrator: I, lattice: Lattice, samples: SampleRange, cancel: &'c AtomicBool) -> Self {
+        let count = lattice.rows().size_hint().0 * lattice.columns().size_hint().0;
+        let pixels = Pixels::new(count, samples.count, scene.aovs.contains(Aov::Error));
+        Self { integrator, lattice, samples, cancel, wave: Wave::default(), pixels, counters: Counters::default() }
     }
 
+    /// Traces the samples of a wave, and hands them over in order.
     #[inline(always)]
-    fn pixel(&mut self, scene: impl Tracer, pixel: (u32, u32)) -> [f32; 3] {
-        self.sum.clear();
-        self.spread.iter_mut().for_each(|spread| spread.clear());
-        for index in self.samples.first..self.samples.first + self.samples.count {
-            let radiance = self.sample(scene, pixel, index);
-            self.sum.push(radiance);
-            self.spread.iter_mut().for_each(|spread| spread.push(radiance));
+    fn trace(&mut self, scene: impl Tracer) {
+        let Wave { rays, samplers, weights, radiance } = &mut self.wave;
+        radiance.clear();
+        radiance.resize(rays.len(), DVec3::ZERO);
+        self.integrator.radiance(scene, rays, samplers, radiance);
+        for (radiance, weight) in radiance.iter().zip(&*weights) {
+            self.counters.camera_rays += 1;
+            let is_valid = radiance.is_finite() && radiance.min_element() >= 0.0;
+            self.counters.invalid_samples += u64::from(!is_valid);
+            self.pixels.push(if is_valid { *radiance * *weight } else { DVec3::ZERO });
         }
-        let mean = self.sum.total() * self.share;
-        // Finite in f64, but perhaps not in f32.
-        mean.to_array().map(|component| component.min(f32::MAX.into()) as f32)
-    }
-
-    #[inline(always)]
-    fn sample(&mut self, scene: impl Tracer, pixel: (u32, u32), index: u64) -> DVec3 {
-        self.counters.camera_rays += 1;
-        let sampler = Sampler::new(scene.seed, pixel, index);
-        let (ray, weight) = camera_ray(&scene, pixel, &sampler);
-        let radiance = self.integrator.radiance(scene, &ray, &sampler);
-        if radiance.is_finite() && radiance.min_element() >= 0.0 {
-            return radiance * weight;
-        }
-        self.counters.invalid_samples += 1;
-        DVec3::ZERO
+        self.wave.clear();
     }
 }
-
 /// The ray of a sample, and the weight of what it sees.
 #[inline(always)]
 pub fn camera_ray(scene: &Scene, pixel: (u32, u32), sampler: &Sampler) -> (Ray, f64) {

@@ -1,10 +1,15 @@
-//! Walks through trees as functions of their own.
+//! Queries and walks through trees as functions of their own.
 
-use super::{Scene, query::Hit, surface::Thing, visit::Blocked};
+use super::{
+    Scene,
+    query::Hit,
+    surface::{Crossing, Thing},
+    visit::Blocked,
+};
 #[cfg(target_arch = "x86_64")]
 use crate::accel::Avx2;
 use crate::{
-    accel::{Baseline, Block, Lanes, Tree},
+    accel::{Baseline, Block, Lanes, Pencil, Tree},
     shape::Ray,
 };
 
@@ -13,6 +18,8 @@ use crate::{
 /// # Safety
 /// The processor has the instructions of the type.
 pub(super) trait Outlined: Lanes {
+    unsafe fn closest(scene: &Scene, ray: &Ray, pencil: Option<&Pencil>) -> Hit;
+    unsafe fn any(scene: &Scene, ray: &Ray, light: Option<usize>, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
     unsafe fn closest_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit);
     unsafe fn any_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool;
     unsafe fn closest_of_leaf(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
@@ -25,11 +32,34 @@ macro_rules! outlined {
     ($lanes:ty $(, $features:literal)?) => {
         impl Outlined for $lanes {
             #[inline(always)]
+            unsafe fn closest(scene: &Scene, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, ray: &Ray, pencil: Option<&Pencil>) -> Hit {
+                    // SAFETY: by the trait's condition, as below.
+                    unsafe { scene.closest_in::<$lanes>(ray, pencil) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, ray, pencil) }
+            }
+
+            #[inline(always)]
+            unsafe fn any(scene: &Scene, ray: &Ray, light: Option<usize>, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+                $(#[target_feature(enable = $features)])?
+                unsafe fn outlined(scene: &Scene, ray: &Ray, light: Option<usize>, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
+                    // SAFETY: see above.
+                    unsafe { scene.any_in::<$lanes>(ray, light, blocks) }
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, ray, light, blocks) }
+            }
+
+            #[inline(always)]
             unsafe fn closest_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit) {
                 $(#[target_feature(enable = $features)])?
                 #[inline(never)]
                 unsafe fn outlined(scene: &Scene, tree: &Tree, ray: &Ray, best: &mut Hit) {
-                    // SAFETY: by the trait's condition, as below.
+                    // SAFETY: see above.
                     unsafe { scene.closest_of_tree_in::<$lanes>(tree, ray, best) }
                 }
                 // SAFETY: see above.

@@ -12,8 +12,6 @@ use super::{
     surface::{Crossing, Thing, in_world},
     tracer::{Tracer, Work},
 };
-#[cfg(target_arch = "x86_64")]
-use crate::accel::Avx2;
 use crate::{
     accel::{Lanes, MeshHit, OTHER, Pencil, Simd},
     description::Render,
@@ -58,6 +56,12 @@ impl Hit {
     #[inline(always)]
     pub(super) fn of_shape(t: f64, object: u32, part: u32, reference: u32) -> Self {
         Self { t, object, part, reference, b1: 0.0, b2: 0.0 }
+    }
+
+    /// The instance of a mesh that was hit.
+    #[inline(always)]
+    pub(super) fn instance(&self) -> Option<usize> {
+        (self.reference >> kind::SHIFT == kind::MESH).then_some((self.reference & kind::INDEX) as usize)
     }
 
     /// `None` for the hit of nothing.
@@ -107,37 +111,6 @@ impl Scene {
 
     pub(super) fn simd(&self) -> Simd {
         self.geometry.simd
-    }
-
-    /// One function for all who ask, so that everything in it is inlined where its instructions are enabled.
-    ///
-    /// # Safety
-    /// The processor has AVX2 and BMI1.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1")]
-    pub(super) unsafe fn closest_avx2(&self, ray: &Ray) -> Hit {
-        // SAFETY: this function enables the instructions.
-        unsafe { self.closest_in::<Avx2>(ray, None) }
-    }
-
-    /// See [`Self::closest_avx2`].
-    ///
-    /// # Safety
-    /// The processor has AVX2 and BMI1.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1")]
-    pub(super) unsafe fn closest_from_eye_avx2(&self, ray: &Ray) -> Hit {
-        // SAFETY: this function enables the instructions.
-        unsafe { self.closest_in::<Avx2>(ray, self.geometry.from_eye.as_ref()) }
-    }
-
-    /// # Safety
-    /// The processor has AVX2 and BMI1.
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,bmi1")]
-    pub(super) unsafe fn any_avx2(&self, ray: &Ray, light: Option<usize>, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
-        // SAFETY: this function enables the instructions.
-        unsafe { self.any_in::<Avx2>(ray, light, blocks) }
     }
 
     /// # Safety
@@ -280,7 +253,7 @@ impl Scene {
 
     /// The surface at a hit. All of it is inlined, so that no surface is handed over in memory: that would take longer than computing it.
     #[inline(always)]
-    pub(super) fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
+    pub(crate) fn surface(&self, ray: &Ray, hit: &Hit) -> Option<Surface> {
         if hit.reference == NONE {
             return None;
         }

@@ -9,7 +9,7 @@ use crate::{
     shape::Ray,
 };
 
-use super::{Crossing, Hit, Scene, Surface};
+use super::{Crossing, Hit, Scene, Surface, outlined::Outlined};
 
 /// A scene and its queries, in code for one kind of processor: what [`Scene::run`] gives to its work. All kinds give the same bits.
 pub trait Tracer: Copy + Deref<Target = Scene> {
@@ -20,8 +20,8 @@ pub trait Tracer: Copy + Deref<Target = Scene> {
     /// one another, eight at a time, go the same way.
     fn hits(self, rays: &[Ray], found: impl FnMut(usize, Option<Hit>));
 
-    /// [`Scene::any`] for many rays, each given to `found` once with its number, in order; `blocks` is given its number too.
-    fn any_of(self, rays: &[Ray], blocks: impl FnMut(usize, u32, &Crossing) -> bool, found: impl FnMut(usize, bool));
+    /// The same for rays that start at the camera's eye.
+    fn hits_from_eye(self, rays: &[Ray], found: impl FnMut(usize, Option<Hit>));
 
     /// See [`Scene::closest`].
     fn closest(self, ray: &Ray) -> Option<Surface>;
@@ -29,12 +29,22 @@ pub trait Tracer: Copy + Deref<Target = Scene> {
     /// The same for a ray that starts at the camera's eye.
     fn closest_from_eye(self, ray: &Ray) -> Option<Surface>;
 
+
     /// See [`Scene::any`].
     fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
 
     /// The same for a ray that ends at a light of [`Scene::lights`], or goes towards it without end. `blocks` need not be asked of surfaces that let
     /// all light through.
     fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
+
+    /// Both for many rays, each given to `found` once with its number, in order; `light` and `blocks` are given its number too.
+    fn any_of(
+        self,
+        rays: &[Ray],
+        light: impl Fn(usize) -> Option<usize>,
+        blocks: impl FnMut(usize, u32, &Crossing) -> bool,
+        found: impl FnMut(usize, bool),
+    );
 }
 
 /// Work that traces many rays. Its functions are compiled once for each kind of processor, as far as they are inlined.
@@ -99,107 +109,60 @@ impl<L> Deref for View<'_, L> {
     }
 }
 
-#[cfg(target_arch = "x86_64")]
-impl Tracer for View<'_, Avx2> {
+impl<L: Outlined> Tracer for View<'_, L> {
     #[inline(always)]
     fn hit(self, ray: &Ray) -> Option<Hit> {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.closest_avx2(ray) }.some()
+        // SAFETY: `self` is the proof, as below.
+        unsafe { L::closest(self.scene, ray, None) }.some()
     }
 
     #[inline(always)]
     fn hits(self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) {
-        // SAFETY: `self` is the proof.
-        if !unsafe { self.scene.hits_in::<Avx2>(rays, &mut found) } {
-            rays.iter().enumerate().for_each(|(number, ray)| found(number, self.hit(ray)));
-        }
+        // SAFETY: see above.
+        unsafe { self.scene.hits_in::<L>(rays, None, |number, hit| found(number, hit.some())) }
     }
 
     #[inline(always)]
-    fn any_of(self, rays: &[Ray], mut blocks: impl FnMut(usize, u32, &Crossing) -> bool, mut found: impl FnMut(usize, bool)) {
-        // SAFETY: `self` is the proof.
-        if !unsafe { self.scene.any_of_in::<Avx2>(rays, &mut blocks, &mut found) } {
-            for (number, ray) in rays.iter().enumerate() {
-                found(number, self.any(ray, |material, crossing| blocks(number, material, crossing)));
-            }
-        }
+    fn hits_from_eye(self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) {
+        // SAFETY: see above.
+        unsafe { self.scene.hits_in::<L>(rays, self.scene.geometry.from_eye.as_ref(), |number, hit| found(number, hit.some())) }
     }
 
     #[inline(always)]
     fn closest(self, ray: &Ray) -> Option<Surface> {
-        // SAFETY: `self` is the proof.
-        let hit = unsafe { self.scene.closest_avx2(ray) };
+        // SAFETY: see above.
+        let hit = unsafe { L::closest(self.scene, ray, None) };
         self.scene.surface(ray, &hit)
     }
 
     #[inline(always)]
     fn closest_from_eye(self, ray: &Ray) -> Option<Surface> {
-        // SAFETY: `self` is the proof.
-        let hit = unsafe { self.scene.closest_from_eye_avx2(ray) };
+        // SAFETY: see above.
+        let hit = unsafe { L::closest(self.scene, ray, self.scene.geometry.from_eye.as_ref()) };
         self.scene.surface(ray, &hit)
     }
 
     #[inline(always)]
     fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.any_avx2(ray, None, blocks) }
+        // SAFETY: see above.
+        unsafe { L::any(self.scene, ray, None, blocks) }
     }
 
     #[inline(always)]
     fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.any_avx2(ray, Some(light), blocks) }
-    }
-}
-
-impl Tracer for View<'_, Baseline> {
-    #[inline(always)]
-    fn hit(self, ray: &Ray) -> Option<Hit> {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.closest_in::<Baseline>(ray, None) }.some()
+        // SAFETY: see above.
+        unsafe { L::any(self.scene, ray, Some(light), blocks) }
     }
 
     #[inline(always)]
-    fn hits(self, rays: &[Ray], mut found: impl FnMut(usize, Option<Hit>)) {
-        // SAFETY: `self` is the proof.
-        if !unsafe { self.scene.hits_in::<Baseline>(rays, &mut found) } {
-            rays.iter().enumerate().for_each(|(number, ray)| found(number, self.hit(ray)));
-        }
-    }
-
-    #[inline(always)]
-    fn any_of(self, rays: &[Ray], mut blocks: impl FnMut(usize, u32, &Crossing) -> bool, mut found: impl FnMut(usize, bool)) {
-        // SAFETY: `self` is the proof.
-        if !unsafe { self.scene.any_of_in::<Baseline>(rays, &mut blocks, &mut found) } {
-            for (number, ray) in rays.iter().enumerate() {
-                found(number, self.any(ray, |material, crossing| blocks(number, material, crossing)));
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn closest(self, ray: &Ray) -> Option<Surface> {
-        // SAFETY: `self` is the proof.
-        let hit = unsafe { self.scene.closest_in::<Baseline>(ray, None) };
-        self.scene.surface(ray, &hit)
-    }
-
-    #[inline(always)]
-    fn closest_from_eye(self, ray: &Ray) -> Option<Surface> {
-        // SAFETY: `self` is the proof.
-        let hit = unsafe { self.scene.closest_in::<Baseline>(ray, self.scene.geometry.from_eye.as_ref()) };
-        self.scene.surface(ray, &hit)
-    }
-
-    #[inline(always)]
-    fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.any_in::<Baseline>(ray, None, blocks) }
-    }
-
-    #[inline(always)]
-    fn any_before_light(self, light: usize, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool {
-        // SAFETY: `self` is the proof.
-        unsafe { self.scene.any_in::<Baseline>(ray, Some(light), blocks) }
+    fn any_of(
+        self,
+        rays: &[Ray],
+        light: impl Fn(usize) -> Option<usize>,
+        blocks: impl FnMut(usize, u32, &Crossing) -> bool,
+        found: impl FnMut(usize, bool),
+    ) {
+        // SAFETY: see above.
+        unsafe { self.scene.any_of_in::<L>(rays, light, blocks, found) }
     }
 }

@@ -171,7 +171,7 @@ pub fn ask(scene: &Scene, rays: &[Ray]) -> Vec<Answer> {
             let single = |ray| Answer { hits: [scene.hit(ray), None], any: [scene.any(ray, |_, _| true), false] };
             let mut answers: Vec<Answer> = self.0.iter().map(single).collect();
             scene.hits(self.0, |ray, hit| answers[ray].hits[1] = hit);
-            scene.any_of(self.0, |_, _, _| true, |ray, is_met| answers[ray].any[1] = is_met);
+            scene.any_of(self.0, |_| None, |_, _, _| true, |ray, is_met| answers[ray].any[1] = is_met);
             answers
         }
     }
@@ -197,7 +197,7 @@ pub fn crossings(scene: &Scene, rays: &[Ray]) -> Vec<[u32; 2]> {
                 counts[ray][1] += 1;
                 false
             };
-            scene.any_of(self.0, count, |_, _| {});
+            scene.any_of(self.0, |_| None, count, |_, _| {});
             counts
         }
     }

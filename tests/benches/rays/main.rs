@@ -144,7 +144,7 @@ fn trace(scene: &Scene, rays: &[Ray], any: bool, at_once: bool, out: &mut Vec<f6
             let Self(rays, any, at_once, out) = self;
             let blocked = |is_blocked: bool| if is_blocked { 0.0 } else { f64::INFINITY };
             match (any, at_once) {
-                (true, true) => scene.any_of(rays, |_, _, _| true, |_, is_blocked| out.push(blocked(is_blocked))),
+                (true, true) => scene.any_of(rays, |_| None, |_, _, _| true, |_, is_blocked| out.push(blocked(is_blocked))),
                 (true, false) => out.extend(rays.iter().map(|ray| blocked(scene.any(ray, |_, _| true)))),
                 (false, true) => scene.hits(rays, |_, hit| out.push(hit.map_or(f64::INFINITY, |hit| hit.t))),
                 (false, false) => out.extend(rays.iter().map(|ray| scene.hit(ray).map_or(f64::INFINITY, |hit| hit.t))),

@@ -57,7 +57,7 @@ fn check_streams(scene: &mut Scene, rays: &[Ray]) {
             });
             assert_eq!(next, rays.len());
             let blocks = |_, _: u32, _: &Crossing| true;
-            scene.any_of(rays, blocks, |ray, is_blocked| assert_eq!(is_blocked, scene.hit(&rays[ray]).is_some(), "{:?}", rays[ray]));
+            scene.any_of(rays, |_| None, blocks, |ray, is_blocked| assert_eq!(is_blocked, scene.hit(&rays[ray]).is_some(), "{:?}", rays[ray]));
         }
     }
     for simd in [Simd::Baseline, Simd::detect()] {
@@ -186,6 +186,7 @@ fn a_split_triangle_is_crossed_once() {
             let mut crossings = vec![0; self.0.len()];
             scene.any_of(
                 self.0,
+                |_| None,
                 |ray, _, _| {
                     crossings[ray] += 1;
                     false
