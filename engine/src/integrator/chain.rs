@@ -49,7 +49,6 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
 
     /// Light that a surface scatters once after mirrors and lenses have gathered it.
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
     pub(super) fn gathered(
         &mut self,
         scene: impl Tracer,
@@ -91,7 +90,9 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             }
             if MEDIA && let Some(medium) = walk.inside.medium(&scene) {
                 let distance = met.as_ref().map_or(f64::INFINITY, |surface| surface.t);
-                let Travel::Arrives(weight) = medium.travel(distance, walk.sampler.pair(set::GATHERED + set::PASSED + passed)) else { break };
+                let Travel::Arrives(weight) = medium.travel(distance, walk.sampler.pair(set::GATHERED + set::PASSED + passed)) else {
+                    break;
+                };
                 walk.throughput *= weight;
             }
             let Some(surface) = met else {
@@ -112,7 +113,8 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             }
             let shading = Shading::new(bsdf, turn, &scene, material, &surface, walk.ray.direction);
             let sets = set::GATHERED + Sampler::FIRST_FREE + walk.depth * set::COUNT;
-            let Some((scattered, direction)) = shading.sample(walk.sampler.one(sets + set::LOBE), walk.sampler.pair(sets + set::SCATTER)) else {
+            let Some((scattered, direction)) = shading.sample(walk.sampler.one(sets + set::LOBE), walk.sampler.pair(sets + set::SCATTER))
+            else {
                 break;
             };
             if !scattered.specular {

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::{path::MOST_PASSED, rgb};
 use crate::{
-    light::{Arriving, Vertex},
+    light::Vertex,
     material::Emission,
     scene::{Inside, Tracer},
     shape::{Ray, Surface},
@@ -93,12 +93,12 @@ fn shown(scene: impl Tracer, emitter: u32, surface: &Surface, direction: DVec3) 
     emission.as_ref().filter(|_| is_it).map_or(DVec3::ZERO, |emission| emitted(scene, surface, emission, direction))
 }
 
-/// The share of light that gets through media and borders that do not show, or what an emitter shows through them.
+/// The share of light that gets through media and borders that do not show, or what a textured emitter shows through them.
 #[inline(never)]
-pub fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside: &Inside) -> DVec3 {
+pub fn through_media(scene: impl Tracer, emitter: Option<u32>, ray: &Ray, inside: &Inside) -> DVec3 {
     let (mut ray, mut inside, mut share) = (*ray, *inside, DVec3::ONE);
     for _ in 0..MOST_PASSED {
-        let t_max = if arriving.textured.is_some() { f64::INFINITY } else { ray.t_max };
+        let t_max = if emitter.is_some() { f64::INFINITY } else { ray.t_max };
         let met = scene.closest(&Ray { t_max, ..ray });
         let way = met.as_ref().map_or(ray.t_max, |surface| surface.t);
         if let Some(medium) = inside.medium(&scene) {
@@ -107,7 +107,7 @@ pub fn through_media(scene: impl Tracer, arriving: &Arriving, ray: &Ray, inside:
         let Some(surface) = met else { return share };
         let (shows, beyond) = inside.through(&scene, &surface, ray.direction);
         if share == DVec3::ZERO || shows {
-            return arriving.textured.map_or(DVec3::ZERO, |emitter| share * shown(scene, emitter, &surface, ray.direction));
+            return emitter.map_or(DVec3::ZERO, |emitter| share * shown(scene, emitter, &surface, ray.direction));
         }
         inside = beyond;
         ray = Ray { t_max: ray.t_max - surface.t, ..surface.spawn(ray.direction) };

@@ -8,6 +8,7 @@ mod path;
 mod photons;
 mod raycast;
 mod shading;
+mod sought;
 mod whitted;
 
 use glam::DVec3;

@@ -7,6 +7,7 @@ use super::{
     chain::{self, Chain},
     found,
     shading::{self, Shading},
+    sought::Sought,
 };
 use crate::{
     light::{Arriving, Caustics, Vertex},
@@ -32,26 +33,7 @@ pub struct Path<'s, const MEDIA: bool> {
     walks: Vec<Walk>,
     rays: Vec<Ray>,
     hits: Vec<Option<Hit>>,
-    sought: Sought,
-}
-
-/// Light of lights that arrives where paths met something, unless something stands before it.
-#[derive(Debug, Default)]
-struct Sought {
-    /// Towards the lights.
-    rays: Vec<Ray>,
-    light: Vec<Light>,
-}
-
-/// Light that arrives along one of the rays.
-#[derive(Clone, Copy, Debug)]
-struct Light {
-    /// Radiance in the pixel.
-    radiance: DVec3,
-    /// The path that it belongs to.
-    number: u32,
-    /// Index among the lights without extent, if it is one of these.
-    delta: Option<u32>,
+    sought: Sought<MEDIA>,
 }
 
 /// What a sample's numbers are for, at every vertex; sets before these belong to film and lens.
@@ -182,7 +164,9 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
     #[inline(always)]
     fn radiance(&mut self, scene: impl Tracer, rays: &[Ray], samplers: &[Sampler], radiance: &mut [DVec3]) {
         let mut walks = std::mem::take(&mut self.walks);
-        walks.extend(rays.iter().zip(samplers).enumerate().map(|(number, (ray, sampler))| Walk::new(number, ray, sampler, scene.around_eye)));
+        walks.extend(
+            rays.iter().zip(samplers).enumerate().map(|(number, (ray, sampler))| Walk::new(number, ray, sampler, scene.around_eye)),
+        );
         self.hits.clear();
         scene.hits_from_eye(rays, |_, hit| self.hits.push(hit));
         loop {
@@ -197,7 +181,7 @@ impl<const MEDIA: bool> Integrator for Path<'_, MEDIA> {
                 }
             }
             walks.truncate(left);
-            self.arrive(scene, radiance);
+            self.sought.arrive(scene, radiance);
             if walks.is_empty() {
                 break;
             }
@@ -222,7 +206,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             self.look_closer(scene, surface, walk);
         }
         let sets = Sampler::FIRST_FREE + (walk.depth - 1) * set::COUNT;
-        let next = match self.scattered_on_the_way(scene, walk, met.as_ref(), sets, radiance) {
+        let next = match self.scattered_on_the_way(scene, walk, met.as_ref(), sets) {
             Some(next) => next,
             None => match &met {
                 None => {
@@ -260,20 +244,6 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         }
     }
 
-    /// Adds the light that was sought and that nothing stands before.
-    #[inline(always)]
-    fn arrive(&mut self, scene: impl Tracer, radiance: &mut [DVec3]) {
-        let Sought { rays, light } = &mut self.sought;
-        let towards = |ray: usize| light[ray].delta.map(|delta| delta as usize);
-        scene.any_of(rays, towards, |_, _, _| true, |ray, is_blocked| {
-            if !is_blocked {
-                radiance[light[ray].number as usize] += light[ray].radiance;
-            }
-        });
-        rays.clear();
-        light.clear();
-    }
-
     /// Looks for what a ray does not tell that meets a surface: other faces in the same place, and the smooth surface that a coarse one stands for.
     #[inline(always)]
     pub(super) fn look_closer(&self, scene: impl Tracer, surface: &mut Surface, walk: &mut Walk) {
@@ -304,7 +274,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         let vertex = Vertex { point: surface.point, normal: Some(surface.ng) };
         if !shading.bsdf.is_specular() {
             let evaluate = |direction| shading.evaluate(direction);
-            *radiance += self.direct(scene, Some(surface), walk, &vertex, sets, evaluate);
+            self.seek(scene, Some(surface), walk, &vertex, sets, evaluate);
             if let Some(caustics) = self.caustics {
                 *radiance += walk.throughput * self.gathered(scene, caustics, surface, &shading, walk, sets);
             }
@@ -319,14 +289,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
 
     /// Lets light be weakened, and perhaps scattered, on the way to the next surface.
     #[inline(always)]
-    fn scattered_on_the_way(
-        &mut self,
-        scene: impl Tracer,
-        walk: &mut Walk,
-        met: Option<&Surface>,
-        sets: u32,
-        radiance: &mut DVec3,
-    ) -> Option<Next> {
+    fn scattered_on_the_way(&mut self, scene: impl Tracer, walk: &mut Walk, met: Option<&Surface>, sets: u32) -> Option<Next> {
         if !MEDIA {
             return None;
         }
@@ -343,30 +306,21 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                 if walk.depth == self.max_depth {
                     return Some(Next::Ends);
                 }
-                Some(self.scatter_in(scene, medium, walk, walk.ray.at(way), sets, radiance))
+                Some(self.scatter_in(scene, medium, walk, walk.ray.at(way), sets))
             }
         }
     }
 
     /// A vertex within a medium.
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
-    fn scatter_in(
-        &mut self,
-        scene: impl Tracer,
-        medium: &Medium,
-        walk: &Walk,
-        point: DVec3,
-        sets: u32,
-        radiance: &mut DVec3,
-    ) -> Next {
+    fn scatter_in(&mut self, scene: impl Tracer, medium: &Medium, walk: &Walk, point: DVec3, sets: u32) -> Next {
         let vertex = Vertex { point, normal: None };
         let along = walk.ray.direction;
         let evaluate = |direction: DVec3| {
             let pdf = medium.phase(along.dot(direction));
             (DVec3::splat(pdf), pdf)
         };
-        *radiance += self.direct(scene, None, walk, &vertex, sets, evaluate);
+        self.seek(scene, None, walk, &vertex, sets, evaluate);
         let (direction, pdf) = medium.scatter(along, walk.sampler.pair(sets + set::SCATTER));
         Next::Along(Scattered { transmitted: true, ..Scattered::reflected(direction, DVec3::ONE, pdf) }, direction, vertex)
     }
@@ -394,10 +348,9 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         walk.throughput != DVec3::ZERO
     }
 
-    /// Seeks light that comes straight from lights and is scattered once, as `evaluate` says; what of it is known at once.
+    /// Seeks light that comes straight from lights and is scattered once, as `evaluate` says.
     #[inline(always)]
-    #[expect(clippy::too_many_arguments, reason = "they are what a vertex is made of")]
-    fn direct(
+    fn seek(
         &mut self,
         scene: impl Tracer,
         surface: Option<&Surface>,
@@ -405,27 +358,25 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         vertex: &Vertex,
         sets: u32,
         evaluate: impl Fn(DVec3) -> (DVec3, f64),
-    ) -> DVec3 {
+    ) {
         let lights = &scene.light_sampler;
-        let mut radiance = DVec3::ZERO;
         if lights.has_local() {
             let pick = if lights.picks_local() { walk.sampler.one(sets + set::LIGHT) } else { 0.0 };
             if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, walk.sampler.pair(sets + set::PLACE)) {
-                radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
+                self.seek_from(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
         if lights.has_distant() {
             let (pick, u) = (walk.sampler.one(sets + set::DISTANT), walk.sampler.pair(sets + set::DIRECTION));
             if let Some(arriving) = lights.sample_distant(&scene.lights, &scene.environment, vertex, pick, u) {
-                radiance += self.scattered(scene, surface, walk, vertex, &arriving, &evaluate);
+                self.seek_from(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
-        radiance
     }
 
-    /// Seeks light that arrives, if nothing stands between, and is passed on; what of it is known at once.
+    /// Seeks the light of one of them.
     #[inline(always)]
-    fn scattered(
+    fn seek_from(
         &mut self,
         scene: impl Tracer,
         surface: Option<&Surface>,
@@ -433,10 +384,10 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         vertex: &Vertex,
         arriving: &Arriving,
         evaluate: &impl Fn(DVec3) -> (DVec3, f64),
-    ) -> DVec3 {
+    ) {
         let (f, pdf) = evaluate(arriving.direction);
         if f == DVec3::ZERO {
-            return DVec3::ZERO;
+            return;
         }
         let weight = arriving.pdf.map_or(1.0, |of_light| found::power_heuristic(of_light, pdf));
         let ray = match surface {
@@ -446,21 +397,14 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
             }
             None => Ray { t_max: arriving.distance, ..Ray::new(vertex.point, arriving.direction) },
         };
-        self.counts.shadow += 1;
-        let light = walk.throughput * f * weight * arriving.light;
-        if MEDIA {
-            let mut inside = walk.inside;
-            if let Some(surface) = surface.filter(|surface| goes_through(scene, surface, walk.ray.direction, ray.direction)) {
-                inside = walk.beyond::<MEDIA>(surface, ray.direction);
+        let inside = || match surface {
+            Some(surface) if goes_through(scene, surface, walk.ray.direction, ray.direction) => {
+                walk.beyond::<MEDIA>(surface, ray.direction)
             }
-            return light * found::through_media(scene, arriving, &ray, &inside);
-        }
-        if let Some(emitter) = arriving.textured {
-            return light * found::looked_up(scene, emitter, &ray);
-        }
-        self.sought.rays.push(ray);
-        self.sought.light.push(Light { radiance: light, number: walk.number, delta: arriving.delta });
-        DVec3::ZERO
+            _ => walk.inside,
+        };
+        self.counts.shadow += 1;
+        self.sought.push(ray, arriving, walk.throughput * f * weight * arriving.light, walk.number, inside);
     }
 }
 

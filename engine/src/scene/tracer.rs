@@ -29,7 +29,6 @@ pub trait Tracer: Copy + Deref<Target = Scene> {
     /// The same for a ray that starts at the camera's eye.
     fn closest_from_eye(self, ray: &Ray) -> Option<Surface>;
 
-
     /// See [`Scene::any`].
     fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
 

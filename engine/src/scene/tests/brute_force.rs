@@ -57,7 +57,12 @@ fn check_streams(scene: &mut Scene, rays: &[Ray]) {
             });
             assert_eq!(next, rays.len());
             let blocks = |_, _: u32, _: &Crossing| true;
-            scene.any_of(rays, |_| None, blocks, |ray, is_blocked| assert_eq!(is_blocked, scene.hit(&rays[ray]).is_some(), "{:?}", rays[ray]));
+            scene.any_of(
+                rays,
+                |_| None,
+                blocks,
+                |ray, is_blocked| assert_eq!(is_blocked, scene.hit(&rays[ray]).is_some(), "{:?}", rays[ray]),
+            );
         }
     }
     for simd in [Simd::Baseline, Simd::detect()] {
