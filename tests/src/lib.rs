@@ -4,6 +4,7 @@
 
 pub mod decoders;
 pub mod farm;
+pub mod jobs;
 pub mod relay;
 pub mod rig;
 pub mod load;

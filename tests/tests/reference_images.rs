@@ -10,11 +10,11 @@
 //! comparisons ask for, nothing would be seen any more. What rare bright paths do to that variance shows in its degrees of freedom, after Satterthwaite:
 //! where these are few, the variance is taken to be at least that of the reference, for as many samples. It saw those paths, and it samples lights and directions as this renderer does.
 
-use std::{collections::BTreeMap, env, fs, path::PathBuf};
+use std::{env, fs, path::PathBuf};
 
 use tessera_engine::{output, part::Rect, scene::Scene};
-use tessera_node::job;
 use tessera_tests::{
+    jobs,
     seeds::{self, Pictures},
     statistics::{Estimate, SIGNIFICANCE, sidak},
 };
@@ -62,10 +62,7 @@ fn root() -> PathBuf {
 
 impl Case {
     fn scene(&self) -> Scene {
-        let path = root().join("../scripts/reference").join(self.script);
-        let (job, unbuilt) = job::load(&path, &BTreeMap::new()).unwrap_or_else(|error| panic!("{error}"));
-        drop(unbuilt);
-        Scene::compile(&job.description.frame, &job.assets).unwrap()
+        jobs::scene(&format!("reference/{}", self.script))
     }
 
     fn table(&self) -> PathBuf {

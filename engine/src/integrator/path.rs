@@ -361,13 +361,13 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
     ) {
         let lights = &scene.light_sampler;
         if lights.has_local() {
-            let pick = if lights.picks_local() { walk.sampler.one(sets + set::LIGHT) } else { 0.0 };
-            if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, walk.sampler.pair(sets + set::PLACE)) {
+            let (pick, u) = (|| walk.sampler.one(sets + set::LIGHT), || walk.sampler.pair(sets + set::PLACE));
+            if let Some(arriving) = lights.sample_local(&scene.lights, vertex, pick, u) {
                 self.seek_from(scene, surface, walk, vertex, &arriving, &evaluate);
             }
         }
         if lights.has_distant() {
-            let (pick, u) = (walk.sampler.one(sets + set::DISTANT), walk.sampler.pair(sets + set::DIRECTION));
+            let (pick, u) = (|| walk.sampler.one(sets + set::DISTANT), || walk.sampler.pair(sets + set::DIRECTION));
             if let Some(arriving) = lights.sample_distant(&scene.lights, &scene.environment, vertex, pick, u) {
                 self.seek_from(scene, surface, walk, vertex, &arriving, &evaluate);
             }

@@ -108,20 +108,22 @@ impl LightSampler {
         !self.tree.is_empty()
     }
 
-    /// Whether there are several of these.
-    pub fn picks_local(&self) -> bool {
-        self.local.len() > 1
-    }
-
-    /// Light from a light that stands somewhere: `pick` chooses the light, `u` the place on it, each of numbers in [0, 1).
+    /// Light from a light that stands somewhere: `pick` draws the number in [0, 1) that chooses the light, `u` those that choose the place on it, where there is a choice.
     #[inline]
-    pub fn sample_local(&self, lights: &[Light], vertex: &Vertex, pick: f64, u: DVec2) -> Option<Arriving> {
+    pub fn sample_local(
+        &self,
+        lights: &[Light],
+        vertex: &Vertex,
+        pick: impl FnOnce() -> f64,
+        u: impl FnOnce() -> DVec2,
+    ) -> Option<Arriving> {
+        let pick = if self.local.len() > 1 { pick() } else { 0.0 };
         let (place, probability) = self.tree.sample(vertex.point, vertex.normal, pick)?;
         match self.local[place as usize] {
             Local::Delta(index) => delta(lights, index, vertex.point, probability),
             Local::Emitter(index) => {
                 let emitter = &self.emitters[index as usize];
-                let sample = emitter.sample(vertex.point, u)?;
+                let sample = emitter.sample(vertex.point, u())?;
                 let pdf = sample.pdf * probability;
                 let (radiance, textured) = if emitter.textured { (DVec3::ONE, Some(index)) } else { (emitter.radiance, None) };
                 let light = radiance / pdf;
@@ -132,8 +134,15 @@ impl LightSampler {
 
     /// The same of the lights infinitely far away.
     #[inline]
-    pub fn sample_distant(&self, lights: &[Light], environment: &Environment, vertex: &Vertex, pick: f64, u: DVec2) -> Option<Arriving> {
-        let (mut at, mut left) = (0, pick);
+    pub fn sample_distant(
+        &self,
+        lights: &[Light],
+        environment: &Environment,
+        vertex: &Vertex,
+        pick: impl FnOnce() -> f64,
+        u: impl FnOnce() -> DVec2,
+    ) -> Option<Arriving> {
+        let (mut at, mut left) = (0, if self.distant.len() > 1 { pick() } else { 0.0 });
         while at + 1 < self.distant.len() && left >= self.distant[at].1 {
             left -= self.distant[at].1;
             at += 1;
@@ -143,14 +152,14 @@ impl LightSampler {
             Distant::Delta(index) => delta(lights, index, vertex.point, *probability),
             Distant::Disc(towards, radiance, sin2) => {
                 let (x, y) = orthonormal_basis(towards);
-                let local = uniform_cone(u, sin2);
+                let local = uniform_cone(u(), sin2);
                 let direction = x * local.x + y * local.y + towards * local.z;
                 let pdf = uniform_cone_pdf(sin2) * probability;
                 let light = radiance / pdf;
                 Some(Arriving { direction, distance: f64::INFINITY, light, pdf: Some(pdf), delta: None, textured: None })
             }
             Distant::Environment => {
-                let (direction, radiance, pdf) = environment.sample(u)?;
+                let (direction, radiance, pdf) = environment.sample(u())?;
                 let pdf = pdf * probability;
                 Some(Arriving { direction, distance: f64::INFINITY, light: radiance / pdf, pdf: Some(pdf), delta: None, textured: None })
             }

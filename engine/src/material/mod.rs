@@ -73,6 +73,8 @@ pub struct Material {
     pub tangents: Option<Coordinates>,
     /// Whether one of its textures asks what a pixel of the film covers.
     pub filtered: bool,
+    /// Whether hits on it have texture coordinates.
+    pub has_coordinates: bool,
     /// All that a model's file says of it.
     pub model: Option<Arc<ModelSurface>>,
 }
@@ -127,6 +129,7 @@ impl Material {
             coat_normal: CoatNormal::Base,
             tangents: is_brushed(material).then(Coordinates::default),
             filtered: texture.and_then(|texture| textures.get(texture as usize)).is_some_and(Texture::is_filtered),
+            has_coordinates: true,
             model: None,
         }
     }
@@ -166,6 +169,7 @@ impl Material {
             coat_normal: if lit { CoatNormal::of(material, first_texture) } else { CoatNormal::Base },
             tangents: tangents(material, textures).filter(|_| lit),
             filtered: material.textures().any(|texture| textures.get(texture).is_some_and(Texture::is_filtered)),
+            has_coordinates: true,
             model,
         }
     }

@@ -280,7 +280,7 @@ mod tests {
         let rect = Rect { x: 0, y: 0, width: scene.film.width, height: scene.film.height };
         let part = render(&scene, rect, SampleRange { first: 0, count: 64 }, &AtomicBool::new(false)).unwrap();
         assert_eq!(part.counters.invalid_samples, 0);
-        assert!(scene.has_media() && scene.light_sampler.has_local() && scene.light_sampler.has_distant());
+        assert!(scene.media && scene.light_sampler.has_local() && scene.light_sampler.has_distant());
     }
 
     /// Other trees are another build to a farm, though no picture tells: these hashes may change at any time, but not unnoticed, and not by machine.

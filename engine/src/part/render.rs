@@ -86,7 +86,7 @@ fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicB
         }
         Render::Path { max_depth, roulette_depth, smooth_terminator } => {
             let caustics = caustics(scene);
-            if scene.has_media() {
+            if scene.media {
                 scene.run(Tracing::new(
                     scene,
                     Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics),

@@ -73,6 +73,7 @@ impl Scene {
         for description in &placed.lights {
             lights.push(light(description)?);
         }
+        placed.materials.iter_mut().for_each(|material| material.has_coordinates = material.is_textured());
         let (emitters, hidden) = emitters(&placed.geometry, &placed.materials, &placed.textures);
         if hidden > 0 {
             let message = format!(
@@ -87,6 +88,7 @@ impl Scene {
             environment,
             medium,
             may_touch: false,
+            media: false,
             around_eye: Inside::default(),
             light_sampler,
             filter: PixelFilter::of(frame.film.filter),

@@ -80,7 +80,7 @@ impl Scene {
     }
 
     fn media(&self) -> String {
-        if self.has_media() {
+        if self.media {
             "media: light is absorbed and scattered on its way; shadow rays are followed from border to border".into()
         } else {
             "no media: paths run without code for them, and shadow rays end at the first thing in their way".into()

@@ -14,6 +14,7 @@ mod models;
 mod outlined;
 mod place;
 mod query;
+mod shortcut;
 mod statistics;
 mod stream;
 mod surface;
@@ -29,6 +30,7 @@ pub use error::{CompileError, Warning};
 pub use inside::Inside;
 pub use joint::Joint;
 pub use query::Hit;
+pub use shortcut::Shortcut;
 pub use statistics::Statistics;
 pub use surface::Crossing;
 pub use tracer::{Tracer, Work};
@@ -42,7 +44,7 @@ use crate::{
     camera::Camera,
     description::{Aovs, Film, Quality, Render},
     light::{Caustics, Environment, Light, LightSampler, Sources},
-    material::{Material, Medium, Recipe},
+    material::{Material, Medium},
     sampling::PixelFilter,
     shape::Bounds,
     texture::Texture,
@@ -70,6 +72,8 @@ pub struct Scene {
     pub medium: Option<Medium>,
     /// Whether there are several objects with an inside whose boxes touch, for `path`.
     pub may_touch: bool,
+    /// Whether something fills space anywhere, or has a border that may not be seen, or lie where another is.
+    pub media: bool,
     /// What the camera is inside of.
     pub around_eye: Inside,
     /// What the frame is gathered on.
@@ -95,14 +99,6 @@ impl Scene {
     /// Where in the world the scene's coordinates begin.
     pub fn begin(&self) -> DVec3 {
         -self.geometry.origin
-    }
-
-    /// Whether something fills space anywhere, or has a border that may not be seen, or lie where another is.
-    pub fn has_media(&self) -> bool {
-        let fills = |Material { recipe, .. }: &Material| {
-            recipe.interior().is_some() || recipe.priority() > 0 || matches!(recipe, Recipe::Boundary { .. })
-        };
-        self.may_touch || self.medium.is_some() || self.materials.iter().any(fills)
     }
 
     /// Lights whose light something in the scene may gather, and these things; `None` if there are none.

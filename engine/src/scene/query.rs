@@ -281,7 +281,7 @@ impl Scene {
             }
             kind::OTHER => {
                 let other = &geometry.others[index];
-                let textured = self.is_textured(other.material);
+                let textured = self.has_coordinates(other.material);
                 in_world(other.shape.point(ray, hit.t, hit.part, textured), hit, other.material)
             }
             kind::TRANSFORMED => self.transformed_surface(ray, hit, index),
@@ -304,7 +304,7 @@ impl Scene {
             LocalShape::Sphere(sphere) => sphere.point(&local, hit.t),
             LocalShape::Cuboid(cuboid) => cuboid.point(&local, hit.t, hit.part),
             LocalShape::Disc(disc) => disc.point(&local, hit.t),
-            LocalShape::Other(other) => other.point(&local, hit.t, hit.part, self.is_textured(placed.material)),
+            LocalShape::Other(other) => other.point(&local, hit.t, hit.part, self.has_coordinates(placed.material)),
         };
         if matches!(placed.shape.shape, LocalShape::Sphere(_)) {
             self.add_sphere_uv(&mut point, placed.material);
@@ -331,7 +331,7 @@ impl Scene {
             _ => ng,
         };
         let material = &self.materials[placed.material as usize];
-        let [uv, uv2] = if material.is_textured() { mesh.uvs_at(&at) } else { [DVec2::ZERO; 2] };
+        let [uv, uv2] = if material.has_coordinates { mesh.uvs_at(&at) } else { [DVec2::ZERO; 2] };
         let tangents = material.tangents.as_ref().map_or([DVec3::ZERO; 2], |coordinates| {
             mesh.tangents_at(&at, local.ns, coordinates).map(|tangent| transform.to_world.transform_vector3(tangent))
         });
@@ -356,14 +356,14 @@ impl Scene {
     }
 
     #[inline(always)]
-    fn is_textured(&self, material: u32) -> bool {
-        self.materials[material as usize].is_textured()
+    fn has_coordinates(&self, material: u32) -> bool {
+        self.materials[material as usize].has_coordinates
     }
 
     /// Longitude and latitude cost more than the hit itself: only textures ask for them.
     #[inline(always)]
     fn add_sphere_uv(&self, point: &mut Point, material: u32) {
-        if self.is_textured(material) {
+        if self.has_coordinates(material) {
             point.uv = Sphere::uv(point.normal);
         }
     }

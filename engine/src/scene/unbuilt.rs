@@ -3,7 +3,10 @@
 use glam::DVec3;
 
 use super::{Inside, Scene, Statistics, Warning, joint::may_touch};
-use crate::description::Render;
+use crate::{
+    description::Render,
+    material::{Material, Recipe},
+};
 
 /// A frame that has been checked and whose assets are read: enough to know what is wrong with it and how large it is, without the time that building it takes.
 #[derive(Debug)]
@@ -34,7 +37,13 @@ impl Unbuilt {
             scene.may_touch = may_touch(boxes);
             scene.around_eye = Inside::of(&scene, scene.camera.eye());
         }
+        scene.media = scene.may_touch || scene.medium.is_some() || scene.materials.iter().any(fills_space);
         scene.statistics = Statistics::of(&scene.geometry);
         scene
     }
+}
+
+/// Whether what has this surface fills space, or may have a border that does not show.
+fn fills_space(Material { recipe, .. }: &Material) -> bool {
+    recipe.interior().is_some() || recipe.priority() > 0 || matches!(recipe, Recipe::Boundary { .. })
 }
