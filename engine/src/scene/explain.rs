@@ -1,6 +1,6 @@
 //! What of light will be modelled in a scene, and what not, because nothing there asks for it.
 
-use super::Scene;
+use super::{Scene, Shortcut};
 use crate::{
     description::Render,
     light::{Environment, Light},
@@ -10,13 +10,17 @@ use crate::{
 impl Scene {
     /// What rendering it will compute, in words, one concept a line.
     pub fn explain(&self) -> Vec<String> {
-        match self.render {
+        let mut plan = match self.render {
             Render::Raycast => vec!["nearest hits alone: no shadows, no reflections; every light shines unhindered".into()],
             Render::Whitted { .. } => vec![self.lights_of_whitted(), self.surfaces_of_whitted()],
             Render::Path { .. } => {
                 vec![self.local_lights(), self.distant_lights(), self.surfaces(), self.gathering(), self.media(), self.lens()]
             }
+        };
+        if self.takes(Shortcut::Outlines) {
+            plan.push("few spheres: rays from the camera, and to lights that stand somewhere, find them by their outlines".into());
         }
+        plan
     }
 
     fn lights_of_whitted(&self) -> String {
