@@ -104,8 +104,24 @@ impl Cone {
             return None;
         }
         // Where the line is nearest to the axis: from there, all that is squared below is no larger than the cone.
-        let nearest = -(from_narrow - self.axis * height).dot(across) / across.length_squared();
-        let start = nearest.max(enters).min(leaves);
+        let beside = from_narrow - self.axis * height;
+        let nearest = -beside.dot(across) / across.length_squared();
+        let crossings = self.crossings_from(nearest.max(enters).min(leaves), from_narrow, direction);
+        // A line close to the side, and along it, may leave it far from there, where little is known of it then. Whether the ray starts within is known.
+        let starts_within = beside.length_squared() < (self.radii[0] + self.slope * height).powi(2);
+        match crossings {
+            Some([(near, _), (far, _)]) if enters > 0.0 || starts_within == (near < 0.0 && far > 0.0) => crossings,
+            None if enters > 0.0 || !starts_within => None,
+            _ => self.crossings_from(0.0, from_narrow, direction),
+        }
+        .map(|crossings| crossings.map(|(t, part)| (if part == SIDE || self.capped { t } else { f64::INFINITY }, part)))
+    }
+
+    /// The crossings of a line, computed from where it has gone for `start`.
+    #[inline(always)]
+    fn crossings_from(&self, start: f64, from_narrow: DVec3, direction: DVec3) -> Option<[(f64, u32); 2]> {
+        let along = self.axis.dot(direction);
+        let across = direction - self.axis * along;
         let p = from_narrow + direction * start;
         let height = self.axis.dot(p);
         let beside = p - self.axis * height;
@@ -116,8 +132,7 @@ impl Cone {
         let [near, far] = self.between_ends(height, along)?;
         let near = if enters >= near.0 { (enters, SIDE) } else { near };
         let far = if leaves <= far.0 { (leaves, SIDE) } else { far };
-        let there = |(t, part): (f64, u32)| (if part == SIDE || self.capped { start + t } else { f64::INFINITY }, part);
-        (near.0 <= far.0).then(|| [there(near), there(far)])
+        (near.0 <= far.0).then(|| [near, far].map(|(t, part)| (start + t, part)))
     }
 
     /// Where a line is between the planes of the ends.
@@ -143,7 +158,12 @@ impl Cone {
         let a = across.length_squared() - growth * growth;
         let b = beside.dot(across) - radius * growth;
         let c = beside.length_squared() - radius * radius;
-        let discriminant = (across * radius - beside * growth).length_squared() - beside.cross(across).length_squared();
+        // From within the side, a line that leads out of it cancels nothing in the usual form either; along the side, where Lagrange's does, it must.
+        let discriminant = if a * c <= 0.0 {
+            b * b - a * c
+        } else {
+            (across * radius - beside * growth).length_squared() - beside.cross(across).length_squared()
+        };
         // A line that is steeper than the side meets it always.
         if discriminant < 0.0 && a >= 0.0 {
             return None;

@@ -148,6 +148,10 @@ pub fn neighbours(rays: u64) -> Tally {
                 continue;
             }
             let spawned = first.spawn(-first.ng);
+            // Nor where the shape is thinner than the gaps between both.
+            if lone.closest(&spawned).is_some_and(|behind| behind.t < 100.0 * error) {
+                continue;
+            }
             let next = scene.closest(&spawned);
             let met = next.is_some_and(|next| next.material == 1 && next.t <= 16.0 * error);
             tally.check(met, || format!("{shape:?} at {by}: {next:?} by {} after {}", bits(&spawned), bits(&ray)));
