@@ -49,17 +49,43 @@ impl Box3 {
 pub struct BinaryNode {
     /// The box around everything below.
     pub bounds: Box3,
-    /// What is below.
-    pub below: Below,
+    /// What is below: twice the index, plus 1 for a pair. Trees over a million instances are large enough while they are made.
+    below: u32,
 }
 
-/// What a node of a binary tree holds.
+impl BinaryNode {
+    /// A node whose box is the one around all that is below.
+    pub fn new(bounds: Box3, below: Below) -> Self {
+        Self { bounds, below: below.packed() }
+    }
+
+    /// What is below.
+    pub fn below(&self) -> Below {
+        if self.below & 1 == 1 { Below::Pair(self.below >> 1) } else { Below::Leaf(self.below >> 1) }
+    }
+
+    /// Puts something else below; the box stays.
+    pub fn put_below(&mut self, below: Below) {
+        self.below = below.packed();
+    }
+}
+
+/// What a node of a binary tree holds. Indices are below 2^31.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Below {
     /// The box of this index.
     Leaf(u32),
     /// Two nodes, at this index and the next.
     Pair(u32),
+}
+
+impl Below {
+    fn packed(self) -> u32 {
+        match self {
+            Self::Leaf(index) => index << 1,
+            Self::Pair(index) => index << 1 | 1,
+        }
+    }
 }
 
 /// A tree that is not at its best yet: enough to tell which of two sets of boxes has the cheaper one.
@@ -77,10 +103,10 @@ impl Draft {
     }
 
     /// The tree at its best. The root is node 0, children stand after their parents, and what is below the first of two comes right after them, before what is
-    /// below the second. No way through it is longer than may be traversed. `boxes` are those that it was made of.
-    pub fn finish(self, boxes: &[Box3]) -> Vec<BinaryNode> {
+    /// below the second. No way through it is longer than may be traversed.
+    pub fn finish(self) -> Vec<BinaryNode> {
         let nodes = in_order(&reinsert::improve(self.0));
-        if depth(&nodes) <= MAX_DEPTH { nodes } else { median::build(boxes) }
+        if depth(&nodes) <= MAX_DEPTH { nodes } else { median::build(&leaves(&nodes)) }
     }
 }
 
@@ -90,9 +116,9 @@ fn in_order(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
     ordered.push(nodes[0]);
     let mut work = vec![0usize];
     while let Some(at) = work.pop() {
-        if let Below::Pair(first) = ordered[at].below {
+        if let Below::Pair(first) = ordered[at].below() {
             let new = ordered.len();
-            ordered[at].below = Below::Pair(new as u32);
+            ordered[at].put_below(Below::Pair(new as u32));
             ordered.extend_from_slice(&nodes[first as usize..first as usize + 2]);
             work.extend([new + 1, new]);
         }
@@ -100,11 +126,22 @@ fn in_order(nodes: &[BinaryNode]) -> Vec<BinaryNode> {
     ordered
 }
 
+/// The boxes that a tree was made of.
+fn leaves(nodes: &[BinaryNode]) -> Vec<Box3> {
+    let mut boxes = vec![Box3::EMPTY; nodes.len() / 2 + 1];
+    for node in nodes {
+        if let Below::Leaf(index) = node.below() {
+            boxes[index as usize] = node.bounds;
+        }
+    }
+    boxes
+}
+
 /// Nodes on the longest way from the root, or 255 if there are more. A wide tree is never deeper than the binary tree that it is made of.
 fn depth(nodes: &[BinaryNode]) -> usize {
     let mut depth = vec![1u8; nodes.len()];
     for (at, node) in nodes.iter().enumerate() {
-        if let Below::Pair(first) = node.below {
+        if let Below::Pair(first) = node.below() {
             let below = depth[at].saturating_add(1);
             depth[first as usize..first as usize + 2].fill(below);
         }
@@ -138,7 +175,7 @@ mod tests {
         let mut seen = vec![false; boxes.len()];
         let mut work = vec![0usize];
         while let Some(at) = work.pop() {
-            match nodes[at].below {
+            match nodes[at].below() {
                 Below::Leaf(index) => {
                     assert_eq!(nodes[at].bounds, boxes[index as usize]);
                     assert!(!std::mem::replace(&mut seen[index as usize], true));
@@ -164,9 +201,9 @@ mod tests {
                 let clustered = cluster::build(&boxes);
                 check(&clustered, &boxes);
                 check(&reinsert::improve(clustered), &boxes);
-                for nodes in [Draft::over(&boxes).finish(&boxes), median::build(&boxes)] {
+                for nodes in [Draft::over(&boxes).finish(), median::build(&boxes)] {
                     check(&nodes, &boxes);
-                    assert_eq!(in_order(&nodes), nodes);
+                    assert_eq!((in_order(&nodes), leaves(&nodes)), (nodes, boxes.clone()));
                 }
             }
         }

@@ -24,7 +24,7 @@ const FEW: usize = 16;
 pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
     let mut clusters = Clusters::new(boxes);
     // Pairs fill the places from the last to the first.
-    let mut nodes = vec![BinaryNode { bounds: Box3::EMPTY, below: Below::Leaf(0) }; 2 * boxes.len() - 1];
+    let mut nodes = vec![BinaryNode::new(Box3::EMPTY, Below::Leaf(0)); 2 * boxes.len() - 1];
     let mut free = nodes.len();
     let mut best = vec![u64::MAX; boxes.len() + WINDOW];
     let (mut first, mut stuck) = (true, false);
@@ -72,7 +72,7 @@ impl Clusters {
 
     fn node(&self, at: usize) -> BinaryNode {
         let [x, y, z, to_x, to_y, to_z] = self.bounds.each_ref().map(|column| column[at]);
-        BinaryNode { bounds: Box3 { min: Vec3::new(x, y, z), max: Vec3::new(to_x, to_y, to_z) }, below: self.below[at] }
+        BinaryNode::new(Box3 { min: Vec3::new(x, y, z), max: Vec3::new(to_x, to_y, to_z) }, self.below[at])
     }
 
     /// Finds for every cluster the one within `REACH` places that makes the smallest box with it: the area's bits above those of the exclusive or of
@@ -141,7 +141,7 @@ impl Clusters {
                 let pair = [node, self.node(other)];
                 *free -= 2;
                 nodes[*free..*free + 2].copy_from_slice(&pair);
-                node = BinaryNode { bounds: pair[0].bounds.union(pair[1].bounds), below: Below::Pair(*free as u32) };
+                node = BinaryNode::new(pair[0].bounds.union(pair[1].bounds), Below::Pair(*free as u32));
             }
             self.put(kept, &node);
             kept += 1;
@@ -156,7 +156,7 @@ impl Clusters {
             self.bounds[axis][at] = min[axis];
             self.bounds[axis + 3][at] = max[axis];
         }
-        self.below[at] = node.below;
+        self.below[at] = node.below();
     }
 }
 

@@ -54,6 +54,7 @@ struct Costs {
 /// A binary tree, and how it is best collapsed.
 pub struct Collapse {
     binary: Vec<BinaryNode>,
+    /// Of those that have a pair below, in the pairs' order.
     plans: Vec<Plan>,
 }
 
@@ -62,19 +63,21 @@ impl Collapse {
     /// GPUs Through Compressed Wide BVHs", 2017, section 3.1). Nodes are in the order of [`super::build::Draft::finish`]. Boxes from `others` on are alone in their
     /// leaves, which cost as much as a node.
     pub fn plan(binary: Vec<BinaryNode>, rule: LeafRule, others: u32) -> Self {
-        let mut plans = vec![Plan::LEAF; binary.len()];
+        let mut plans = vec![Plan::LEAF; binary.len() / 2];
         // Costs are asked for once, by the parent. From the last pair to the first, those of the children of both of a pair are the last that were found.
         let mut known: Vec<Costs> = Vec::new();
         let mut of = |at: usize, known: &mut Vec<Costs>| {
-            let children = matches!(binary[at].below, Below::Pair(_)).then(|| [known.pop(), known.pop()]);
-            let children = if let Some([Some(first), Some(second)]) = children { Some([first, second]) } else { None };
             let area = binary[at].bounds.half_area();
-            let (plan, costs) = match binary[at].below {
-                Below::Leaf(other) if other >= others => (Plan::LEAF, Costs { of: [area; 7], count: TOO_MANY }),
-                _ => weigh(area, children, rule),
-            };
-            plans[at] = plan;
-            costs
+            match (binary[at].below(), known.last_chunk::<2>()) {
+                (Below::Leaf(other), _) if other >= others => Costs { of: [area; 7], count: TOO_MANY },
+                (Below::Pair(pair), Some(&[second, first])) => {
+                    known.truncate(known.len() - 2);
+                    let (plan, costs) = weigh(area, [first, second], rule);
+                    plans[pair as usize / 2] = plan;
+                    costs
+                }
+                _ => Costs { of: [area * rule.cost; 7], count: 1 },
+            }
         };
         for first in (1..binary.len()).step_by(2).rev() {
             let first_costs = of(first, &mut known);
@@ -87,15 +90,16 @@ impl Collapse {
 
     /// Makes the wide tree. `leaf` is given the boxes of every leaf, in ascending order, and returns what its reference holds (31 bits).
     pub fn carry_out(self, leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
-        collapse(&self.binary, &self.plans, leaf)
+        let Self { binary, plans } = &self;
+        collapse(binary, &|at| if let Below::Pair(pair) = binary[at].below() { plans[pair as usize / 2] } else { Plan::LEAF }, leaf)
     }
 }
 
-fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
+fn collapse(binary: &[BinaryNode], plan_of: &impl Fn(usize) -> Plan, mut leaf: impl FnMut(&[u32]) -> u32) -> Collapsed {
     let mut out = Collapsed { nodes: Vec::new(), root: LEAF };
     let mut content = Vec::new();
     let mut reference = |at: usize, next_node: usize| {
-        if plans[at].wide > 0 {
+        if plan_of(at).wide > 0 {
             return (next_node as u32, true);
         }
         content.clear();
@@ -113,9 +117,10 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
     let mut children = Vec::with_capacity(8);
     while let Some((at, place)) = work.pop() {
         children.clear();
-        if let Below::Pair(first) = binary[at].below {
-            gather(binary, plans, first as usize, plans[at].wide.into(), &mut children);
-            gather(binary, plans, first as usize + 1, 8 - usize::from(plans[at].wide), &mut children);
+        if let Below::Pair(first) = binary[at].below() {
+            let places = plan_of(at).wide.into();
+            gather(binary, plan_of, first as usize, places, &mut children);
+            gather(binary, plan_of, first as usize + 1, 8 - places, &mut children);
         }
         // Any-hit traversal takes children in order: large ones are hit most.
         children.sort_by(|&a, &b| binary[b].bounds.half_area().total_cmp(&binary[a].bounds.half_area()).then(a.cmp(&b)));
@@ -138,10 +143,9 @@ fn collapse(binary: &[BinaryNode], plans: &[Plan], mut leaf: impl FnMut(&[u32]) 
     out
 }
 
-/// The best plan for a node of this area: a leaf, or what its children are.
-fn weigh(area: f32, children: Option<[Costs; 2]>, rule: LeafRule) -> (Plan, Costs) {
+/// The best plan for a node of this area over a pair: a leaf, or what its children are.
+fn weigh(area: f32, [first, second]: [Costs; 2], rule: LeafRule) -> (Plan, Costs) {
     let mut plan = Plan::LEAF;
-    let Some([first, second]) = children else { return (plan, Costs { of: [area * rule.cost; 7], count: 1 }) };
     let best_split = |places: usize| {
         let splits = places.saturating_sub(7).max(1)..places.min(8);
         let costs = splits.map(|k| (first.of[k - 1] + second.of[places - k - 1], k as u8));
@@ -166,22 +170,23 @@ fn weigh(area: f32, children: Option<[Costs; 2]>, rule: LeafRule) -> (Plan, Cost
 }
 
 /// The nodes that take up to `places` places for the subtree at `at`.
-fn gather(binary: &[BinaryNode], plans: &[Plan], at: usize, mut places: usize, out: &mut Vec<usize>) {
-    while places > 1 && plans[at].split[places - 1] == 0 {
+fn gather(binary: &[BinaryNode], plan_of: &impl Fn(usize) -> Plan, at: usize, mut places: usize, out: &mut Vec<usize>) {
+    let plan = plan_of(at);
+    while places > 1 && plan.split[places - 1] == 0 {
         places -= 1;
     }
-    match binary[at].below {
+    match binary[at].below() {
         Below::Pair(first) if places > 1 => {
-            let split = usize::from(plans[at].split[places - 1]);
-            gather(binary, plans, first as usize, split, out);
-            gather(binary, plans, first as usize + 1, places - split, out);
+            let split = usize::from(plan.split[places - 1]);
+            gather(binary, plan_of, first as usize, split, out);
+            gather(binary, plan_of, first as usize + 1, places - split, out);
         }
         _ => out.push(at),
     }
 }
 
 fn boxes_below(binary: &[BinaryNode], at: usize, out: &mut Vec<u32>) {
-    match binary[at].below {
+    match binary[at].below() {
         Below::Leaf(index) => out.push(index),
         Below::Pair(first) => {
             boxes_below(binary, first as usize, out);

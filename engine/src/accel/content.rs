@@ -55,7 +55,6 @@ impl<'a> Content<'a> {
         let soup = Soup::new(&frame, origin, &parts);
         let normalised = |b: &Bounds| Box3 { min: frame.point(b.min).as_vec3(), max: frame.point(b.max).as_vec3() };
         let others: Vec<Box3> = boxes.iter().map(normalised).collect();
-        // Each is dropped as soon as it can be: a million instances weigh enough.
         drop(boxes);
         let Cheapest { plan, triangles } = Cheapest::of(&soup, others, leaves);
         let (mut packed, mut begins) = (Vec::new(), vec![0]);
@@ -175,20 +174,27 @@ impl Parts {
 
 impl Cheapest {
     fn of(soup: &Soup, others: Vec<Box3>, leaves: LeafRule) -> Self {
+        // Each set of boxes is dropped as soon as it can be: a million instances weigh enough.
         let mut whole: Vec<Box3> = parallel::map(soup.count, |triangle| Box3::of(soup.vertices(triangle as u32)));
         let parts = if whole.is_empty() { None } else { split(&whole, |triangle| soup.vertices(triangle)) };
-        whole.extend_from_slice(&others);
-        let plain = Draft::over(&whole);
+        let plain = if whole.is_empty() {
+            Draft::over(&others)
+        } else {
+            whole.extend_from_slice(&others);
+            Draft::over(&whole)
+        };
+        drop(whole);
         if let Some(References { mut boxes, triangles }) = parts {
             boxes.extend_from_slice(&others);
             let split = Draft::over(&boxes);
             if split.cost() < plain.cost() {
-                let plan = Collapse::plan(split.finish(&boxes), leaves, triangles.len() as u32);
+                drop(boxes);
+                let plan = Collapse::plan(split.finish(), leaves, triangles.len() as u32);
                 return Self { plan, triangles: Parts(triangles) };
             }
         }
         drop(others);
-        let plan = Collapse::plan(plain.finish(&whole), leaves, soup.count as u32);
+        let plan = Collapse::plan(plain.finish(), leaves, soup.count as u32);
         Self { plan, triangles: Parts(Vec::new()) }
     }
 }

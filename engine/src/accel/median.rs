@@ -5,19 +5,19 @@ use super::build::{Below, BinaryNode, Box3};
 /// Builds a tree over at least one box whose depth is the logarithm of their number, its nodes in the order of [`super::build::Draft::finish`].
 pub fn build(boxes: &[Box3]) -> Vec<BinaryNode> {
     let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-    let mut nodes = vec![BinaryNode { bounds: Box3::EMPTY, below: Below::Leaf(0) }];
+    let mut nodes = vec![BinaryNode::new(Box3::EMPTY, Below::Leaf(0))];
     let mut work = vec![(0usize, 0..order.len())];
     while let Some((at, range)) = work.pop() {
         let part = &mut order[range.clone()];
         let bounds = part.iter().fold(Box3::EMPTY, |sum, &i| sum.union(boxes[i as usize]));
         if let [only] = *part {
-            nodes[at] = BinaryNode { bounds, below: Below::Leaf(only) };
+            nodes[at] = BinaryNode::new(bounds, Below::Leaf(only));
             continue;
         }
         let middle = part.len() / 2;
         part.select_nth_unstable_by(middle, split_order(boxes, part));
         let first = nodes.len();
-        nodes[at] = BinaryNode { bounds, below: Below::Pair(first as u32) };
+        nodes[at] = BinaryNode::new(bounds, Below::Pair(first as u32));
         nodes.extend([nodes[at]; 2]);
         work.push((first + 1, range.start + middle..range.end));
         work.push((first, range.start..range.start + middle));

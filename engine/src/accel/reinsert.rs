@@ -62,7 +62,7 @@ impl Linked {
 
     /// Tells the children of a node where it is.
     fn link(&mut self, at: u32) {
-        if let Below::Pair(first) = self.nodes[at as usize].below {
+        if let Below::Pair(first) = self.nodes[at as usize].below() {
             self.parents[first as usize] = at;
             self.parents[first as usize + 1] = at;
         }
@@ -112,7 +112,7 @@ impl Linked {
                 if here > best.gain {
                     best = Move { gain: here, from, to: at };
                 }
-                if let Below::Pair(first) = node.below {
+                if let Below::Pair(first) = node.below() {
                     let below = here + node.bounds.half_area();
                     ahead.extend([(below, first), (below, first + 1)]);
                 }
@@ -141,7 +141,7 @@ impl Linked {
         about.iter().for_each(|&node| self.touched[node as usize] = true);
         // The pair goes below `to`, where the sibling's place is taken by what was there; the sibling goes to where their parent was.
         let (host, left) = (self.nodes[to as usize], self.nodes[beside as usize]);
-        self.nodes[to as usize].below = Below::Pair(from.min(beside));
+        self.nodes[to as usize].put_below(Below::Pair(from.min(beside)));
         self.nodes[beside as usize] = host;
         self.nodes[parent as usize] = left;
         [to, beside, parent].into_iter().for_each(|node| self.link(node));
@@ -153,7 +153,7 @@ impl Linked {
 
     /// Fits the boxes from a node with children upwards, as far as they change.
     fn refit(&mut self, mut at: u32) {
-        while let Below::Pair(first) = self.nodes[at as usize].below {
+        while let Below::Pair(first) = self.nodes[at as usize].below() {
             let bounds = self.bounds(first).union(self.bounds(first + 1));
             if std::mem::replace(&mut self.nodes[at as usize].bounds, bounds) == bounds || at == 0 {
                 return;

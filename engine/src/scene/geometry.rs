@@ -24,11 +24,6 @@ pub struct Placed<S> {
 pub struct Transform {
     pub to_world: DAffine3,
     pub to_object: DAffine3,
-    /// Largest factor by which a vector's largest component grows on the way to the world, and back.
-    growth_to_world: f64,
-    growth_to_object: f64,
-    /// Whether it only moves.
-    moves: bool,
 }
 
 /// A finite shape under a map that does not leave it the same kind of shape.
@@ -52,6 +47,8 @@ pub struct Transformed {
 pub struct Instance {
     pub mesh: u32,
     pub transform: Transform,
+    /// Whether its place is one that only moves.
+    pub moves: bool,
     /// Whether hits must be asked if the surface is there: it has an alpha mask, or no back.
     pub masked: bool,
 }
@@ -137,35 +134,46 @@ impl LocalShape {
     }
 }
 
+impl Instance {
+    /// A ray in the mesh's coordinates, where there are no listed spheres; `t` keeps its meaning.
+    #[inline(always)]
+    pub fn of_ray(&self, ray: &Ray) -> Ray {
+        let to_object = &self.transform.to_object;
+        if self.moves {
+            // The same bits.
+            Ray { origin: ray.origin + to_object.translation, leaves: 0, ..*ray }
+        } else {
+            ray.transformed(to_object)
+        }
+    }
+}
+
 impl Transform {
     /// `None` if the map is not finite or cannot be inverted.
     pub fn new(to_world: DAffine3) -> Option<Self> {
         let to_object = to_world.inverse();
-        let growth = |m: DMat3| max_abs(m.x_axis.abs() + m.y_axis.abs() + m.z_axis.abs());
-        let (growth_to_world, growth_to_object) = (growth(to_world.matrix3), growth(to_object.matrix3));
-        let usable = to_world.is_finite() && to_object.is_finite() && growth_to_world > 0.0 && growth_to_object > 0.0;
-        usable.then_some(Self { to_world, to_object, moves: to_world.matrix3 == DMat3::IDENTITY, growth_to_world, growth_to_object })
+        let transform = Self { to_world, to_object };
+        let usable = to_world.is_finite() && to_object.is_finite() && transform.growths().iter().all(|growth| *growth > 0.0);
+        usable.then_some(transform)
+    }
+
+    /// Whether it neither turns nor scales.
+    pub fn moves(&self) -> bool {
+        self.to_world.matrix3 == DMat3::IDENTITY
     }
 
     /// Whether all that it does is to move the origin to a place.
     pub fn only_moves_to(&self, origin: DVec3) -> bool {
-        self.moves && self.to_world.translation == origin
+        self.moves() && self.to_world.translation == origin
     }
 
     /// Largest factors by which a vector's largest component grows on the way to the object, and back.
-    pub fn growths(&self) -> [f64; 2] {
-        [self.growth_to_object, self.growth_to_world]
-    }
-
-    /// A ray in the object's coordinates, where there are no listed spheres; `t` keeps its meaning.
     #[inline(always)]
-    pub fn of_ray(&self, ray: &Ray) -> Ray {
-        if self.moves {
-            // The same bits.
-            Ray { origin: ray.origin + self.to_object.translation, leaves: 0, ..*ray }
-        } else {
-            ray.transformed(&self.to_object)
-        }
+    pub fn growths(&self) -> [f64; 2] {
+        [&self.to_object, &self.to_world].map(|map| {
+            let DMat3 { x_axis, y_axis, z_axis } = map.matrix3;
+            max_abs(x_axis.abs() + y_axis.abs() + z_axis.abs())
+        })
     }
 
     /// The box around the image of a box.
@@ -193,7 +201,8 @@ impl Transform {
 
     /// A bound on the coordinates of the image of a box.
     pub fn reach(&self, bounds: Bounds) -> f64 {
-        self.growth_to_world * max_abs(bounds.min).max(max_abs(bounds.max)) + max_abs(self.to_world.translation)
+        let [_, growth] = self.growths();
+        growth * max_abs(bounds.min).max(max_abs(bounds.max)) + max_abs(self.to_world.translation)
     }
 
     /// A unit normal in the world (by the inverse transpose).
@@ -206,9 +215,9 @@ impl Transform {
     /// coordinates adds when a ray starts there.
     #[inline]
     pub fn error(&self, error: f64, object: DVec3, world: DVec3) -> f64 {
-        let back = self.growth_to_object * max_abs(world) + max_abs(self.to_object.translation);
-        16.0 * UNIT * (max_abs(world) + max_abs(self.to_world.translation) + self.growth_to_world * (max_abs(object) + back))
-            + self.growth_to_world * error
+        let [to_object, to_world] = self.growths();
+        let back = to_object * max_abs(world) + max_abs(self.to_object.translation);
+        16.0 * UNIT * (max_abs(world) + max_abs(self.to_world.translation) + to_world * (max_abs(object) + back)) + to_world * error
     }
 }
 

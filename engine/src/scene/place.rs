@@ -243,7 +243,7 @@ impl<'a> Placer<'a> {
         check_reach(transform.reach(self.geometry.meshes[mesh as usize].triangles.bounds()), source)?;
         let surface = &self.materials[material as usize];
         let masked = surface.is_masked() || !surface.double_sided;
-        self.geometry.instances.push(Placed { shape: Instance { mesh, transform, masked }, object, material });
+        self.geometry.instances.push(Placed { shape: Instance { mesh, moves: transform.moves(), transform, masked }, object, material });
         Ok(())
     }
 

@@ -153,7 +153,7 @@ impl Scene {
     #[inline(never)]
     fn exact(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit> {
         let placed = self.instance(instance);
-        self.geometry.meshes[placed.shape.mesh as usize].triangles.hit(triangle, &placed.shape.transform.of_ray(ray))
+        self.geometry.meshes[placed.shape.mesh as usize].triangles.hit(triangle, &placed.shape.of_ray(ray))
     }
 
     /// What a leaf of the world's tree holds that is no pack of triangles.
@@ -167,7 +167,7 @@ impl Scene {
         }
         let number = reference & kind::INDEX;
         let (Some(tree), placed) = (self.tree_of(number), self.instance(number)) else { return };
-        let (local, limit) = (placed.shape.transform.of_ray(ray), best.t);
+        let (local, limit) = (placed.shape.of_ray(ray), best.t);
         // SAFETY: the caller has the instructions of `L`.
         unsafe { tree.walk::<L, false>(&local, limit, &mut ClosestThere { scene: self, number, best }) };
     }
@@ -188,7 +188,7 @@ impl Scene {
         }
         let number = reference & kind::INDEX;
         let (Some(tree), placed) = (self.tree_of(number), self.instance(number)) else { return false };
-        let local = placed.shape.transform.of_ray(ray);
+        let local = placed.shape.of_ray(ray);
         let mut visitor = AnyThere { scene: self, number, t_max: ray.t_max, is_blocked: false, blocked };
         // SAFETY: the caller has the instructions of `L`.
         unsafe { tree.walk::<L, true>(&local, ray.t_max, &mut visitor) };
@@ -225,7 +225,7 @@ impl Scene {
             }
             kind::TRANSFORMED => {
                 let placed = &geometry.transformed[index];
-                let local = placed.shape.transform.of_ray(ray);
+                let local = ray.transformed(&placed.shape.transform.to_object);
                 let hit = match &placed.shape.shape {
                     LocalShape::Sphere(sphere) => sphere.closest::<false>(&local).map(|t| (t, 0)),
                     LocalShape::Cuboid(cuboid) => cuboid.closest(&local),
@@ -261,7 +261,7 @@ impl Scene {
             }
             kind::TRANSFORMED => {
                 let placed = &geometry.transformed[index];
-                let local = placed.shape.transform.of_ray(ray);
+                let local = ray.transformed(&placed.shape.transform.to_object);
                 let crossings = match &placed.shape.shape {
                     LocalShape::Sphere(sphere) => sphere.crossings::<false>(local.origin, local.direction),
                     LocalShape::Cuboid(cuboid) => cuboid.crossings(local.origin, local.direction).map(|[near, far]| [near.0, far.0]),
