@@ -36,6 +36,9 @@ pub struct Photon {
 /// Most photons of a cell.
 const MOST: usize = 256;
 
+/// What has less than this share of a cell's light is no beam of its own: each costs time at every point.
+const LEAST: f64 = 0.05;
+
 /// A cell reaches beyond its photons by this share of its size.
 const MARGIN: f64 = 0.1;
 
@@ -71,7 +74,7 @@ struct Cell {
     beams: [u32; 2],
 }
 
-/// Light that comes from one mirror or lens.
+/// Light that comes from one mirror or lens, or all from those that send little.
 #[derive(Clone, Copy, Debug)]
 struct Beam {
     /// Its share of the cell's light and that of those before it.
@@ -134,9 +137,12 @@ impl Caustics {
         let bounds = Bounds { min: bounds.min - margin, max: bounds.max + margin };
         // A point within the cell must be nearer to its middle than where rays come together.
         let most = 0.5 / (bounds.max - middle).length().max(f64::MIN_POSITIVE);
-        photons.sort_by_key(|photon| photon.caster);
         let (first, total, mut up_to) = (self.beams.len(), flux(photons), 0.0);
-        for photons in photons.chunk_by(|a, b| a.caster == b.caster) {
+        photons.sort_by_key(|photon| photon.caster);
+        let beams = photons.chunk_by(|a, b| a.caster == b.caster);
+        let (beams, weak): (Vec<_>, Vec<_>) = beams.partition(|photons| flux(photons) >= LEAST * total);
+        let weak = weak.concat();
+        for photons in beams.into_iter().chain([&*weak]).filter(|photons| !photons.is_empty()) {
             let share = flux(photons) / total;
             up_to += share;
             let convergence = convergence(photons).clamp(-most, most);
