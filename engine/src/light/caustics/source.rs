@@ -21,6 +21,12 @@ const AIMED: f64 = 0.75;
 /// Most targets.
 const MOST_TARGETS: usize = 1 << 10;
 
+/// What of an image around the scene is so many times as bright as its mean sends photons: the rest is seen from so many places that chance finds it as well.
+const BRIGHT: f64 = 16.0;
+
+/// Places of an image that are looked at to learn how much of its light comes from bright ones.
+const LOOKS: u64 = 1 << 12;
+
 /// A ball around something.
 #[derive(Clone, Copy, Debug)]
 struct Ball {
@@ -43,6 +49,8 @@ impl Ball {
 #[derive(Debug)]
 pub struct Sources<'s> {
     environment: &'s Environment,
+    /// The luminance from which on it sends photons.
+    bright: f64,
     /// Around all that light comes from afar to.
     whole: Ball,
     pairs: Vec<Pair<'s>>,
@@ -64,7 +72,8 @@ enum Origin<'s> {
     Emitter(&'s Emitter),
     /// Towards its middle, its radiance, the squared sine of half the angle under which it is seen.
     Sun(DVec3, DVec3, f64),
-    Environment,
+    /// The share of its light that comes from bright places.
+    Environment(f64),
 }
 
 /// How a photon leaves: the pair of light and target, and the numbers in [0, 1)^2 behind its direction.
@@ -115,8 +124,10 @@ impl<'s> Sources<'s> {
         }
         let mut origins: Vec<_> = emitters.into_iter().map(Origin::Emitter).collect();
         origins.extend(lights.suns().map(|(towards, radiance, sin2)| Origin::Sun(towards, radiance, sin2)));
-        if matches!(environment, Environment::Image(_)) {
-            origins.push(Origin::Environment);
+        let bright = BRIGHT * luminance(environment.mean_radiance());
+        let share = if matches!(environment, Environment::Image(_)) { share_of_bright(environment, bright) } else { 0.0 };
+        if share > 0.0 {
+            origins.push(Origin::Environment(share));
         }
         let pairs: Vec<_> = origins.iter().flat_map(|&origin| targets.iter().map(move |&target| Pair { origin, target })).collect();
         let mut sum = 0.0;
@@ -125,7 +136,15 @@ impl<'s> Sources<'s> {
             sum
         };
         let sums: Vec<_> = pairs.iter().map(&mut up_to).collect();
-        (sum > 0.0 && sum.is_finite()).then_some(Self { environment, whole, pairs, sums, aims: Vec::new(), squares: Squares::default() })
+        (sum > 0.0 && sum.is_finite()).then_some(Self {
+            environment,
+            bright,
+            whole,
+            pairs,
+            sums,
+            aims: Vec::new(),
+            squares: Squares::default(),
+        })
     }
 
     /// The same, but most photons go where others have been of use: each of these with its worth, not negative.
@@ -176,9 +195,9 @@ impl<'s> Sources<'s> {
                 let way = x * local.x + y * local.y + towards * local.z;
                 Some(self.across(target, way, radiance / uniform_cone_pdf(sin2), u))
             }
-            Origin::Environment => {
+            Origin::Environment(_) => {
                 let (towards, radiance, pdf) = self.environment.sample(sampler.pair(set::PLACE))?;
-                Some(self.across(target, towards, radiance / pdf, u))
+                (luminance(radiance) >= self.bright).then(|| self.across(target, towards, radiance / pdf, u))
             }
         }?;
         let flux = flux / density;
@@ -207,9 +226,21 @@ impl Pair<'_> {
                 power(emitter) * section / squared
             }
             Origin::Sun(_, radiance, sin2) => luminance(radiance) * PI * sin2 * section,
-            Origin::Environment => luminance(environment.mean_radiance()) * 4.0 * PI * section,
+            Origin::Environment(share) => luminance(environment.mean_radiance()) * 4.0 * PI * share * section,
         }
     }
+}
+
+/// How much of an image's light comes from where it has this luminance.
+fn share_of_bright(environment: &Environment, bright: f64) -> f64 {
+    let (mut all, mut of_bright) = (0.0, 0.0);
+    for look in 0..LOOKS {
+        let Some((_, radiance, pdf)) = environment.sample(Sampler::new(0, (0, 0), look).pair(set::PLACE)) else { continue };
+        let power = luminance(radiance) / pdf;
+        all += power;
+        of_bright += if luminance(radiance) >= bright { power } else { 0.0 };
+    }
+    if of_bright > 0.0 { of_bright / all } else { 0.0 }
 }
 
 /// In all directions, but for a factor.

@@ -1,7 +1,10 @@
-use glam::{DVec2, DVec3, swizzles::Vec2Swizzles as _};
+use glam::{DMat3, DVec2, DVec3, swizzles::Vec2Swizzles as _};
 
 use super::*;
-use crate::sampling::{Sampler, uniform_sphere};
+use crate::{
+    light::{Environment, ImageEnvironment, LightSampler},
+    sampling::{Sampler, uniform_sphere},
+};
 
 /// Points in order, spread evenly.
 fn numbers(count: u64) -> impl Iterator<Item = (f64, DVec2)> {
@@ -97,4 +100,22 @@ fn nothing_is_proposed_where_no_light_was_gathered() {
     // All at one point.
     let one = Photon { point: DVec3::ONE, ..photons(5.0)[0] };
     assert!(Caustics::new(vec![one; 1000]).sample(DVec3::ONE, 0.5, DVec2::splat(0.5)).is_some());
+}
+
+/// Of an image of a dim sky with a bright spot, photons come from there alone; of one without, none are sent.
+#[test]
+fn only_bright_places_of_an_image_send_photons() {
+    let image = |spot: f32| {
+        let pixels = (0..32 * 16).map(|at| if at == 5 * 32 + 9 { [spot; 3] } else { [1.0; 3] }).collect();
+        Environment::Image(ImageEnvironment::new(32, 16, pixels, DMat3::IDENTITY, 1.0).unwrap())
+    };
+    let ball = Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE };
+    let (dim, bright) = (image(8.0), image(8000.0));
+    let lights = LightSampler::new(Vec::new(), &[], &dim);
+    assert!(Sources::new(&lights, &dim, vec![ball], ball).is_none());
+    let sources = Sources::new(&lights, &bright, vec![ball], ball).unwrap();
+    let photons: Vec<_> = (0..1000).filter_map(|number| sources.depart(&Sampler::new(0, (0, 0), number))).collect();
+    assert!(photons.len() > 500, "{}", photons.len());
+    let least = 16.0 * bright.mean_radiance().x;
+    assert!(photons.iter().all(|photon| bright.radiance(-photon.direction).x > 0.999 * least));
 }
