@@ -30,7 +30,7 @@ const SECONDS: f64 = 0.3;
 fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let named = |script: &&str| arguments.iter().any(|argument| argument == script);
-    let all = !SCRIPTS.iter().any(|script| named(&script));
+    let all = !SCRIPTS.iter().any(&named);
     println!("{:28}{:24}{:>8}", "script", "shortcut", "gain");
     for script in SCRIPTS.iter().filter(|script| all || named(script)) {
         let shortcuts: Vec<_> = Shortcut::ALL.into_iter().filter(|shortcut| jobs::scene(script).takes(*shortcut)).collect();

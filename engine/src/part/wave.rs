@@ -6,7 +6,7 @@ use super::render::camera_ray;
 use crate::{sampling::Sampler, scene::Scene, shape::Ray};
 
 /// Most samples in a wave: so many that few rays are left alone where most have ended, and so few that they stay close to the processor.
-const SIZE: usize = 1024;
+const SIZE: usize = 512;
 
 /// Samples of one pixel after the other.
 #[derive(Default)]

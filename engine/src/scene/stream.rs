@@ -14,6 +14,9 @@ use crate::{
     shape::Ray,
 };
 
+/// To make room for a stream takes about as long as a ray.
+const FEW: usize = 4;
+
 impl Scene {
     /// Nearest hits of many rays, each handed over once, in order.
     ///
@@ -21,7 +24,7 @@ impl Scene {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     pub(super) unsafe fn hits_in<L: Outlined>(&self, rays: &[Ray], pencil: Option<&Pencil>, mut found: impl FnMut(usize, Hit)) {
-        let Some(tree) = self.tree_for_streams() else {
+        let Some(tree) = self.tree_for_streams(rays.len()) else {
             // SAFETY: the caller has the instructions of `L`.
             rays.iter().enumerate().for_each(|(number, ray)| found(number, unsafe { L::closest(self, ray, pencil) }));
             return;
@@ -51,7 +54,7 @@ impl Scene {
         mut blocks: impl FnMut(usize, u32, &Crossing) -> bool,
         mut found: impl FnMut(usize, bool),
     ) {
-        let Some(tree) = self.tree_for_streams() else {
+        let Some(tree) = self.tree_for_streams(rays.len()) else {
             for (number, ray) in rays.iter().enumerate() {
                 // SAFETY: the caller has the instructions of `L`.
                 found(number, unsafe { L::any(self, ray, light(number), |material, crossing| blocks(number, material, crossing)) });
@@ -96,9 +99,9 @@ impl Scene {
         Some((&self.geometry.meshes[instance.shape.mesh as usize].triangles, hit.part))
     }
 
-    /// The tree, if many rays at a time are faster through it than one by one.
-    fn tree_for_streams(&self) -> Option<&Tree> {
-        self.geometry.tree.as_ref().filter(|_| !self.geometry.instances.is_empty())
+    /// The tree, if so many rays at a time are faster through it than one by one.
+    fn tree_for_streams(&self, rays: usize) -> Option<&Tree> {
+        self.geometry.tree.as_ref().filter(|_| rays >= FEW && !self.geometry.instances.is_empty())
     }
 
     /// # Safety
