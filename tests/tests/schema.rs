@@ -9,7 +9,7 @@ const BINARY: &str = env!("CARGO_BIN_EXE_tessera-under-test");
 
 const JOB: &str = r#"local tessera = require("tessera")
 return tessera.job {
-  scene = tessera.scene { objects = { tessera.plane {} }, background = {1, 1, 1} },
+  scene = tessera.scene { objects = { tessera.plane { material = tessera.diffuse { reflectance = 0.5 } } }, background = {1, 1, 1} },
   camera = tessera.perspective { eye = {0, 1, 5}, look_at = {0, 0, 0}, fov = 40 },
   film = { width = 32, height = 24 },
   render = tessera.raycast {},
