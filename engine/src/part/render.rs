@@ -80,31 +80,30 @@ struct Traced {
 
 fn trace(scene: &Scene, lattice: Lattice, samples: SampleRange, cancel: &AtomicBool) -> Result<Traced, Cancelled> {
     match scene.render {
-        Render::Raycast => scene.run(Tracing::new(scene, Raycast::default(), lattice, samples, cancel)),
+        Render::Raycast => trace_by(Raycast::default(), scene, lattice, samples, cancel),
         Render::Whitted { max_depth, transparent_shadows, min_weight } => {
-            scene.run(Tracing::new(scene, Whitted::new(max_depth, transparent_shadows, min_weight), lattice, samples, cancel))
+            trace_by(Whitted::new(max_depth, transparent_shadows, min_weight), scene, lattice, samples, cancel)
         }
         Render::Path { max_depth, roulette_depth, smooth_terminator } => {
             let caustics = caustics(scene);
             if scene.media {
-                scene.run(Tracing::new(
-                    scene,
-                    Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics),
-                    lattice,
-                    samples,
-                    cancel,
-                ))
+                trace_by(Path::<true>::new(max_depth, roulette_depth, smooth_terminator, caustics), scene, lattice, samples, cancel)
             } else {
-                scene.run(Tracing::new(
-                    scene,
-                    Path::<false>::new(max_depth, roulette_depth, smooth_terminator, caustics),
-                    lattice,
-                    samples,
-                    cancel,
-                ))
+                trace_by(Path::<false>::new(max_depth, roulette_depth, smooth_terminator, caustics), scene, lattice, samples, cancel)
             }
         }
     }
+}
+
+fn trace_by(
+    integrator: impl Integrator,
+    scene: &Scene,
+    lattice: Lattice,
+    samples: SampleRange,
+    cancel: &AtomicBool,
+) -> Result<Traced, Cancelled> {
+    let pixels = Pixels::new(lattice.rows().count() * lattice.columns().count(), samples.count, scene.aovs.contains(Aov::Error));
+    scene.run(Tracing { integrator, lattice, samples, cancel, wave: Wave::default(), pixels, counters: Counters::default() })
 }
 
 struct Tracing<'c, I> {
@@ -142,13 +141,7 @@ impl<I: Integrator> Work for Tracing<'_, I> {
     }
 }
 
-impl<'c, I: Integrator> Tracing<'c, I> {
-    fn new(scene: &Scene, integrator: I, lattice: Lattice, samples: SampleRange, cancel: &'c AtomicBool) -> Self {
-        let count = lattice.rows().size_hint().0 * lattice.columns().size_hint().0;
-        let pixels = Pixels::new(count, samples.count, scene.aovs.contains(Aov::Error));
-        Self { integrator, lattice, samples, cancel, wave: Wave::default(), pixels, counters: Counters::default() }
-    }
-
+impl<I: Integrator> Tracing<'_, I> {
     /// Traces the samples of a wave, and hands them over in order.
     #[inline(always)]
     fn trace(&mut self, scene: impl Tracer) {
