@@ -127,7 +127,7 @@ function tessera.scene(keys) end
 ---@field transform? tessera.Transform places it
 ---@field name? string for messages
 
----Its uv are longitude and latitude about y, each in [0, 1].
+---Its uv are longitude and latitude about y, each in [0, 1]: u = 0.5 faces +z and grows towards +x, v = 0 is +y.
 ---@param keys tessera.SphereKeys
 ---@return tessera.Object
 function tessera.sphere(keys) end
@@ -169,7 +169,7 @@ function tessera.box(keys) end
 ---@field transform? tessera.Transform places it
 ---@field name? string for messages
 
----A flat circle. Its uv run from 0 to 1 across the diameter.
+---A flat circle. Its uv run from 0 to 1 across the diameter: seen from its front with +y up, u to the right and v down.
 ---@param keys tessera.DiscKeys
 ---@return tessera.Object
 function tessera.disc(keys) end
@@ -531,7 +531,7 @@ function tessera.directional(keys) end
 ---@field look_at? tessera.Vec3 a point in the middle of the cone
 ---@field intensity tessera.Color power per steradian inside of the inner cone, as for tessera.point
 ---@field outer? number angle between the middle and where it is dark: half of what a lamp's data sheet may call its angle
----@field inner? number angle between the middle and where it begins to weaken, smoothly
+---@field inner? number angle between the middle and where it begins to weaken: by 3 x^2 - 2 x^3 of the cosine between both
 ---@field name? string for messages
 
 ---A point light that shines into a cone. Give direction or look_at.

@@ -1,39 +1,51 @@
 //! Albedos of microfacets: which share of light a rough surface scatters once. What is missing is scattered more often.
 
+use std::ops::RangeInclusive;
+
 use glam::DVec3;
 
 use super::{
     conductor::schlick_weight,
     dielectric::interface,
     microfacet::Ggx,
+    stretched::{Lookup, Stretched},
     table::{Fill, Table},
 };
 use crate::sampling::sin_cos_of_turn;
 
-/// Points of a quadrature, two neighbours of Fibonacci's sequence: where total reflection begins at once, for one roughness, for all.
+/// Points of a quadrature, two neighbours of Fibonacci's sequence: where total reflection begins at once, for one roughness, for all isotropic ones.
 const FINEST: (u32, u32) = (4181, 2584);
 const FINE: (u32, u32) = (2584, 1597);
 const MIDDLE: (u32, u32) = (1597, 987);
+/// The same, for each of many tables.
+const COARSE: (u32, u32) = (610, 377);
 
 /// What white facets reflect once, and what Schlick's weights of grazing angles take of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Albedo(Table<2>);
+pub struct Albedo(Lookup<2>);
 
 impl Albedo {
     /// For one roughness along x and y, clamped as by [`Ggx::new`]; takes some milliseconds.
     pub fn fixed(alpha: [f64; 2]) -> Self {
-        Self(Table::fixed(&Ggx::clamped(alpha), &Facets(Normals::new(if alpha[0] == alpha[1] { FINE } else { MIDDLE }))))
+        let facets = Facets(Normals::new(if alpha[0] == alpha[1] { FINE } else { MIDDLE }));
+        Self(Lookup::Table(Table::fixed(&Ggx::clamped(alpha), &facets)))
     }
 
-    /// For all isotropic roughnesses, in some hundred milliseconds; of anisotropic ones it knows an estimate.
+    /// For all isotropic roughnesses, in some hundred milliseconds; it takes anisotropic facets for isotropic ones.
     pub fn over_roughness() -> Self {
-        Self(Table::over_roughness(&Facets(Normals::new(MIDDLE))))
+        Self(Lookup::Table(Table::over_roughness(&Facets(Normals::new(MIDDLE)))))
     }
 
-    /// `1 - E(w)`: what white facets do not reflect at once of light from `w`, in [0, 1]; nothing where the table knows but an estimate.
+    /// For facets of these roughnesses and strengths of anisotropy, as [`super::stretched::alphas`] takes them; in some ten milliseconds, and in a second if both are ranges.
+    pub fn stretched(roughness: &RangeInclusive<f64>, strength: &RangeInclusive<f64>) -> Self {
+        let [fine, coarse] = [MIDDLE, COARSE].map(|count| Facets(Normals::new(count)));
+        Self(Lookup::Stretched(Stretched::new(roughness, strength, &fine, &coarse)))
+    }
+
+    /// `1 - E(w)`: what white facets do not reflect at once of light from `w`, in [0, 1].
     #[inline(always)]
     pub fn missing(&self, ggx: &Ggx, w: DVec3) -> f64 {
-        if self.0.knows(ggx) { self.0.at(ggx, w)[0] } else { 0.0 }
+        self.0.at(ggx, w)[0]
     }
 
     /// `[1 - E(w), E_5(w)]`: beside what is missing, what facets reflect once that reflect `(1 - cos)^5`. Facets of reflectance
@@ -44,22 +56,10 @@ impl Albedo {
         [missing, excess + (1.0 - missing) * schlick_weight(w.z.abs())]
     }
 
-    /// As [`Self::schlick`] of a table for all roughnesses; for anisotropic facets, of which it knows nothing exact, a bound: nothing is missing, and
-    /// Schlick's part is that of isotropic ones, as rough as these are at least or on average, whichever is more.
-    #[inline]
-    pub fn schlick_at_most(&self, ggx: &Ggx, w: DVec3) -> [f64; 2] {
-        let alpha = ggx.alpha();
-        if alpha.x == alpha.y {
-            return self.schlick(ggx, w);
-        }
-        let five = |alpha: f64| self.schlick(&Ggx::clamped([alpha; 2]), w)[1];
-        [0.0, five(alpha.min_element()).max(five((0.5 * alpha.length_squared()).sqrt()))]
-    }
-
     /// Mean of [`Self::missing`] over the cosine-weighted hemisphere.
     #[inline(always)]
     pub fn missing_average(&self, ggx: &Ggx) -> f64 {
-        if self.0.knows(ggx) { self.0.mean::<Facets>(ggx)[0] } else { 0.0 }
+        self.0.mean::<Facets>(ggx)[0]
     }
 
     /// Means of [`Self::schlick`] over the cosine-weighted hemisphere.
@@ -74,7 +74,7 @@ impl Albedo {
 /// What the facets of a dielectric reflect or refract once.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DielectricAlbedo {
-    table: Table<3>,
+    table: Lookup<3>,
     eta: f64,
     /// Means of the smooth transmittance over the cosine-weighted hemispheres outside and inside.
     transmitted: [f64; 2],
@@ -83,23 +83,23 @@ pub struct DielectricAlbedo {
 impl DielectricAlbedo {
     /// For one roughness along x and y, clamped as by [`Ggx::new`]; `eta` is the index of the inside relative to the outside, above 0.
     pub fn fixed(eta: f64, alpha: [f64; 2]) -> Self {
-        Self {
-            table: Table::fixed(
-                &Ggx::clamped(alpha),
-                &Interfaces { normals: Normals::new(if alpha[0] == alpha[1] { FINEST } else { MIDDLE }), eta },
-            ),
-            eta,
-            transmitted: transmitted_average(eta),
-        }
+        let interfaces = Interfaces { normals: Normals::new(if alpha[0] == alpha[1] { FINEST } else { MIDDLE }), eta };
+        Self::new(eta, Lookup::Table(Table::fixed(&Ggx::clamped(alpha), &interfaces)))
     }
 
-    /// For all isotropic roughnesses, in some hundred milliseconds; of anisotropic ones it knows an estimate.
+    /// For all isotropic roughnesses, in some hundred milliseconds; it takes anisotropic facets for isotropic ones.
     pub fn over_roughness(eta: f64) -> Self {
-        Self {
-            table: Table::over_roughness(&Interfaces { normals: Normals::new(MIDDLE), eta }),
-            eta,
-            transmitted: transmitted_average(eta),
-        }
+        Self::new(eta, Lookup::Table(Table::over_roughness(&Interfaces { normals: Normals::new(MIDDLE), eta })))
+    }
+
+    /// As [`Albedo::stretched`].
+    pub fn stretched(eta: f64, roughness: &RangeInclusive<f64>, strength: &RangeInclusive<f64>) -> Self {
+        let [fine, coarse] = [MIDDLE, COARSE].map(|count| Interfaces { normals: Normals::new(count), eta });
+        Self::new(eta, Lookup::Stretched(Stretched::new(roughness, strength, &fine, &coarse)))
+    }
+
+    fn new(eta: f64, table: Lookup<3>) -> Self {
+        Self { table, eta, transmitted: transmitted_average(eta) }
     }
 
     /// Index of the inside relative to the outside.
@@ -127,12 +127,9 @@ impl DielectricAlbedo {
         1.0 - self.transmitted[0] + self.table.mean::<Interfaces>(ggx)[0]
     }
 
-    /// What is neither reflected nor refracted at once of light from `w`, on the side of `w`, in [0, 1]; nothing where the table knows but an estimate.
+    /// What is neither reflected nor refracted at once of light from `w`, on the side of `w`, in [0, 1].
     #[inline]
     pub fn missing(&self, ggx: &Ggx, w: DVec3) -> f64 {
-        if !self.table.knows(ggx) {
-            return 0.0;
-        }
         let [_, outside, inside] = self.table.at(ggx, w);
         if w.z > 0.0 { outside } else { inside }
     }
@@ -140,9 +137,6 @@ impl DielectricAlbedo {
     /// Means of [`Self::missing`] over the cosine-weighted hemispheres outside and inside.
     #[inline]
     pub fn missing_average(&self, ggx: &Ggx) -> [f64; 2] {
-        if !self.table.knows(ggx) {
-            return [0.0; 2];
-        }
         let [_, outside, inside] = self.table.mean::<Interfaces>(ggx);
         [outside, inside]
     }

@@ -32,11 +32,11 @@ impl Gloss {
         f0 * white + (self.f90 - f0) * five
     }
 
-    /// The greatest component of what is reflected at most of light from `w`, and what white facets do not reflect at once.
+    /// The greatest component of what is reflected of light from `w`, and what white facets do not reflect at once.
     #[inline]
     pub fn albedo(&self, table: &Albedo, w: DVec3) -> [f64; 2] {
         let [missing, five] = match &self.rough {
-            Some(ggx) => table.schlick_at_most(ggx, w),
+            Some(ggx) => table.schlick(ggx, w),
             None => [0.0, schlick_weight(w.z.abs())],
         };
         [self.mix(1.0 - missing, five), missing]

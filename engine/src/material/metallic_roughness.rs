@@ -16,6 +16,7 @@ use super::{
     local::{cosine_density, cosine_hemisphere},
     refractive::Dielectric,
     sheen::{self, SheenAlbedo},
+    stretched::alphas,
 };
 use crate::math::orthonormal_basis;
 
@@ -74,11 +75,13 @@ impl Default for Parameters {
 /// Tables that materials share; compute them once a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Tables<'a> {
-    /// [`Albedo::over_roughness`].
+    /// Of the base's facets: [`Albedo::over_roughness`], or [`Albedo::stretched`] where they are anisotropic.
     pub facets: &'a Albedo,
+    /// [`Albedo::over_roughness`]; without it, there is no coat.
+    pub coat: Option<&'a Albedo>,
     /// The albedo of sheen; without it, there is no sheen.
     pub sheen: Option<&'a SheenAlbedo>,
-    /// [`DielectricAlbedo::over_roughness`] for the material's index, if it bounds a volume; without it, rough glass loses some light.
+    /// Of the base's facets, for the material's index, if it bounds a volume; without it, rough glass loses some light.
     pub glass: Option<&'a DielectricAlbedo>,
 }
 
@@ -126,10 +129,7 @@ impl<'a> MetallicRoughness<'a> {
         let (opaque, through) = ((1.0 - metallic) * (1.0 - transmission), (1.0 - metallic) * transmission);
         let mixture = [metallic, opaque, if volume { 0.0 } else { through }, if volume { through } else { 0.0 }];
         let roughness = unit(p.roughness);
-        let (alpha, stretch) = (roughness * roughness, unit(p.anisotropy));
-        let alpha = [alpha + (1.0 - alpha) * stretch * stretch, alpha];
-        // Estimates of anisotropic albedos are too coarse to give light back.
-        let known = (alpha[0] == alpha[1]).then_some(tables.facets);
+        let alpha = alphas(roughness, unit(p.anisotropy));
         let base_color = p.base_color.clamp(DVec3::ZERO, DVec3::ONE);
         let ior = p.ior.max(1.0);
         let straight = ((ior - 1.0) / (ior + 1.0)) * ((ior - 1.0) / (ior + 1.0));
@@ -138,17 +138,16 @@ impl<'a> MetallicRoughness<'a> {
         let specular = Gloss::new(f0, specular, alpha);
         let coat_alpha = unit(p.clearcoat_roughness) * unit(p.clearcoat_roughness);
         let coat = Gloss::new(DVec3::splat(0.04), 1.0, [coat_alpha; 2]);
-        let glass_table = tables.glass.filter(|_| known.is_some());
         let [missing, five] = specular.rough.map_or([0.0, 1.0 / 21.0], |ggx| tables.facets.schlick_average(&ggx));
         Self {
             tables,
             base_color,
             mixture,
-            metal: Conductor::new(Fresnel::Schlick(base_color), alpha, known),
-            glass: Dielectric::new(ior, DVec3::ONE, base_color, alpha, glass_table),
+            metal: Conductor::new(Fresnel::Schlick(base_color), alpha, Some(tables.facets)),
+            glass: Dielectric::new(ior, DVec3::ONE, base_color, alpha, tables.glass),
             specular,
             coat,
-            clearcoat: unit(p.clearcoat),
+            clearcoat: if tables.coat.is_some() { unit(p.clearcoat) } else { 0.0 },
             coat_axes: None,
             sheen_color: if tables.sheen.is_some() { p.sheen_color.clamp(DVec3::ZERO, DVec3::ONE) } else { DVec3::ZERO },
             sheen_roughness: p.sheen_roughness,
@@ -230,8 +229,10 @@ impl<'a> MetallicRoughness<'a> {
     #[inline]
     fn seen(&self, w: DVec3) -> Seen {
         let bare = self.volume && w.z < 0.0;
-        let coat =
-            if bare || self.clearcoat == 0.0 { 0.0 } else { self.clearcoat * self.coat.albedo(self.tables.facets, self.in_coat(w))[0] };
+        let coat = match self.tables.coat {
+            Some(table) if !bare && self.clearcoat > 0.0 => self.clearcoat * self.coat.albedo(table, self.in_coat(w))[0],
+            _ => 0.0,
+        };
         let fibres = match self.tables.sheen {
             Some(table) if !bare && self.sheen_color != DVec3::ZERO => table.at(self.sheen_roughness, w.z),
             _ => 0.0,

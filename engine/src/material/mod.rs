@@ -20,6 +20,7 @@ mod recipe;
 mod refractive;
 mod rough_diffuse;
 mod sheen;
+mod stretched;
 mod table;
 mod tables;
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! From a material and a point of its surface to the BSDF there.
 
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::{DVec2, DVec3};
 
@@ -84,6 +84,7 @@ pub enum Recipe {
 pub struct ModelRecipe {
     surface: Arc<ModelSurface>,
     facets: Arc<Albedo>,
+    coat: Option<Arc<Albedo>>,
     sheen: Option<Arc<SheenAlbedo>>,
     glass: Option<Arc<DielectricAlbedo>>,
     /// Index of refraction, if light goes through it into a volume.
@@ -99,7 +100,8 @@ impl ModelRecipe {
             parameters.ior /= outside;
         }
         let glass = self.glass.as_deref().filter(|_| outside == 1.0);
-        (MetallicRoughness::new(&parameters, Tables { facets: &self.facets, sheen: self.sheen.as_deref(), glass }), direction)
+        let tables = Tables { facets: &self.facets, coat: self.coat.as_deref(), sheen: self.sheen.as_deref(), glass };
+        (MetallicRoughness::new(&parameters, tables), direction)
     }
 
     /// Index of refraction of the inside, if there is one.
@@ -177,12 +179,21 @@ impl Recipe {
         }
         let encloses = material.transmission.is_some() && material.volume.is_some() && material.metallic < 1.0;
         let ior = encloses.then(|| f64::from(material.ior).max(1.0));
-        let rough = material.roughness > 0.0;
+        let facets = facets(material);
+        let rough = material.roughness > 0.0 || facets.is_some();
+        let glass = ior.filter(|_| rough).map(|ior| match &facets {
+            Some((roughness, strength)) => tables.dielectric_stretched(ior, roughness, strength),
+            None => tables.dielectric_over_roughness(ior),
+        });
         Self::Model(Box::new(ModelRecipe {
             surface: Arc::clone(surface),
-            facets: tables.over_roughness(),
+            facets: match &facets {
+                Some((roughness, strength)) => tables.stretched(roughness, strength),
+                None => tables.over_roughness(),
+            },
+            coat: material.clearcoat.is_some().then(|| tables.over_roughness()),
             sheen: material.sheen.is_some().then(|| tables.sheen()),
-            glass: ior.filter(|_| rough).map(|ior| tables.dielectric_over_roughness(ior)),
+            glass,
             ior,
             interior: ior.and_then(|_| surface.absorption()).and_then(Medium::absorbing),
         }))
@@ -255,6 +266,14 @@ impl Recipe {
             _ => 1.0,
         }
     }
+}
+
+/// Roughnesses and strengths of anisotropy that a material may have, unless it is isotropic.
+fn facets(material: &ModelMaterial) -> Option<(RangeInclusive<f64>, RangeInclusive<f64>)> {
+    let range = |factor: f32, texture: Option<usize>| if texture.is_some() { 0.0..=factor.into() } else { factor.into()..=factor.into() };
+    let anisotropy = material.anisotropy.filter(|anisotropy| anisotropy.strength > 0.0)?;
+    let roughness = range(material.roughness, material.metallic_roughness_texture);
+    Some((roughness, range(anisotropy.strength, anisotropy.texture)))
 }
 
 /// A colour, multiplied by a texture and by vertex colours, where there are such.

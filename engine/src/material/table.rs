@@ -103,12 +103,6 @@ impl<const K: usize> Table<K> {
         table
     }
 
-    /// Whether the table tells more than an estimate of these facets.
-    #[inline(always)]
-    pub fn knows(&self, ggx: &Ggx) -> bool {
-        self.rows != Rows::Roughness || ggx.alpha().x == ggx.alpha().y
-    }
-
     /// The values for facets and a direction, on either side. A table for all roughnesses takes anisotropic facets for isotropic ones.
     #[inline]
     pub fn at(&self, ggx: &Ggx, w: DVec3) -> [f64; K] {

@@ -1,6 +1,6 @@
 //! Tables that materials share, made when the first of them asks.
 
-use std::{collections::BTreeMap, sync::Arc};
+use std::{collections::BTreeMap, ops::RangeInclusive, sync::Arc};
 
 use super::{
     energy::{Albedo, DielectricAlbedo},
@@ -14,6 +14,8 @@ pub struct SharedTables {
     fixed_dielectric: BTreeMap<[u64; 2], Arc<DielectricAlbedo>>,
     over_roughness: Option<Arc<Albedo>>,
     dielectric_over_roughness: BTreeMap<u64, Arc<DielectricAlbedo>>,
+    stretched: BTreeMap<[u64; 4], Arc<Albedo>>,
+    dielectric_stretched: BTreeMap<[u64; 5], Arc<DielectricAlbedo>>,
     sheen: Option<Arc<SheenAlbedo>>,
 }
 
@@ -39,6 +41,25 @@ impl SharedTables {
     pub fn dielectric_over_roughness(&mut self, eta: f64) -> Arc<DielectricAlbedo> {
         let make = || Arc::new(DielectricAlbedo::over_roughness(eta));
         Arc::clone(self.dielectric_over_roughness.entry(eta.to_bits()).or_insert_with(make))
+    }
+
+    /// Of anisotropic facets of these roughnesses and strengths; see [`Albedo::stretched`].
+    pub fn stretched(&mut self, roughness: &RangeInclusive<f64>, strength: &RangeInclusive<f64>) -> Arc<Albedo> {
+        let make = || Arc::new(Albedo::stretched(roughness, strength));
+        let key = [roughness.start(), roughness.end(), strength.start(), strength.end()].map(|x| x.to_bits());
+        Arc::clone(self.stretched.entry(key).or_insert_with(make))
+    }
+
+    /// Of anisotropic facets of a dielectric.
+    pub fn dielectric_stretched(
+        &mut self,
+        eta: f64,
+        roughness: &RangeInclusive<f64>,
+        strength: &RangeInclusive<f64>,
+    ) -> Arc<DielectricAlbedo> {
+        let make = || Arc::new(DielectricAlbedo::stretched(eta, roughness, strength));
+        let key = [&eta, roughness.start(), roughness.end(), strength.start(), strength.end()].map(|x| x.to_bits());
+        Arc::clone(self.dielectric_stretched.entry(key).or_insert_with(make))
     }
 
     /// Of fibres.

@@ -58,7 +58,9 @@ impl Image {
                 decode_with("PNG", decoder, bytes.len(), color_space)
             }
             Kind::Hdr => {
-                let decoder = HdrDecoder::new(Cursor::new(bytes)).map_err(|e| broken("Radiance HDR", &e))?;
+                // The decoder knows the second name of the format only where it is told not to look.
+                let strict = !bytes.starts_with(b"#?RGBE");
+                let decoder = HdrDecoder::with_strictness(Cursor::new(bytes), strict).map_err(|e| broken("Radiance HDR", &e))?;
                 decode_with("Radiance HDR", decoder, bytes.len(), color_space)
             }
             Kind::Jpeg => decode_jpeg(bytes, color_space),

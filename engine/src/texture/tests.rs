@@ -152,11 +152,13 @@ fn reads_jpeg_and_radiance_hdr() {
     let jpeg = Image::decode(&jpeg(), ColorSpace::Linear).unwrap();
     assert_eq!(jpeg.size(), [16, 8]);
     assert_eq!((jpeg.pixel(3, 4)[0], jpeg.pixel(12, 4)[2]), (228.0 / 255.0, 128.0 / 255.0));
-    let mut hdr = b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n".to_vec();
-    hdr.extend([128, 64, 0, 129, 128, 128, 128, 136]);
-    let hdr = Image::decode(&hdr, ColorSpace::Srgb).unwrap();
-    assert_eq!(hdr.pixel(0, 0), [1.0, 0.5, 0.0, 1.0]);
-    assert_eq!(hdr.pixel(1, 0), [128.0, 128.0, 128.0, 1.0]);
+    for name in ["RADIANCE", "RGBE"] {
+        let mut hdr = format!("#?{name}\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n").into_bytes();
+        hdr.extend([128, 64, 0, 129, 128, 128, 128, 136]);
+        let hdr = Image::decode(&hdr, ColorSpace::Srgb).unwrap();
+        assert_eq!(hdr.pixel(0, 0), [1.0, 0.5, 0.0, 1.0]);
+        assert_eq!(hdr.pixel(1, 0), [128.0, 128.0, 128.0, 1.0]);
+    }
 }
 
 #[test]

@@ -7,7 +7,7 @@ fn tilts() -> [DVec3; 3] {
 }
 
 fn model(p: Parameters) -> MetallicRoughness<'static> {
-    MetallicRoughness::new(&p, Tables { facets: &ALBEDO, sheen: Some(&SHEEN), glass: None })
+    MetallicRoughness::new(&p, Tables { facets: &ALBEDO, coat: Some(&ALBEDO), sheen: Some(&SHEEN), glass: None })
 }
 
 fn coated(roughness: f64) -> Parameters {

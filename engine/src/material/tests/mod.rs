@@ -33,6 +33,8 @@ struct Case {
 
 static ALBEDO: LazyLock<Albedo> = LazyLock::new(Albedo::over_roughness);
 
+static STRETCHED: LazyLock<Albedo> = LazyLock::new(|| Albedo::stretched(&(0.0..=1.0), &(0.0..=1.0)));
+static STRETCHED_GLASS: LazyLock<DielectricAlbedo> = LazyLock::new(|| DielectricAlbedo::stretched(1.5, &(0.0..=1.0), &(0.0..=1.0)));
 static GLASS: LazyLock<DielectricAlbedo> = LazyLock::new(|| DielectricAlbedo::over_roughness(1.5));
 static SHEEN: LazyLock<SheenAlbedo> = LazyLock::new(SheenAlbedo::new);
 
@@ -84,8 +86,10 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
         }
     }
     let gltf = |p: Parameters| {
-        let glass = p.volume.then_some(&*GLASS);
-        Bsdf::MetallicRoughness(Box::leak(Box::new(MetallicRoughness::new(&p, Tables { facets: &ALBEDO, sheen: Some(&SHEEN), glass }))))
+        let anisotropic = p.anisotropy > 0.0;
+        let (facets, glass) = if anisotropic { (&*STRETCHED, &*STRETCHED_GLASS) } else { (&*ALBEDO, &*GLASS) };
+        let tables = Tables { facets, coat: Some(&ALBEDO), sheen: Some(&SHEEN), glass: p.volume.then_some(glass) };
+        Bsdf::MetallicRoughness(Box::leak(Box::new(MetallicRoughness::new(&p, tables))))
     };
     let plain = Parameters::default();
     for roughness in [0.0, 0.35, 1.0] {
@@ -101,7 +105,8 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
             false,
             true,
         );
-        let of = |p: Parameters| MetallicRoughness::new(&p, Tables { facets: &ALBEDO, sheen: Some(&SHEEN), glass: None });
+        let of =
+            |p: Parameters| MetallicRoughness::new(&p, Tables { facets: &ALBEDO, coat: Some(&ALBEDO), sheen: Some(&SHEEN), glass: None });
         for (name, of_coat) in [("", 0.4), ("smooth ", 0.0)] {
             let tilted = of(Parameters { clearcoat: 0.9, clearcoat_roughness: of_coat, metallic: 0.5, ..p });
             let tilted = Box::leak(Box::new(tilted.with_coat_normal(DVec3::new(-0.5, 0.2, 1.0).normalize())));
@@ -111,8 +116,8 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
         add(format!("gltf sheen {roughness}"), gltf(Parameters { sheen_color: DVec3::ONE, sheen_roughness: 0.4, ..p }), false, false);
         add(format!("gltf rough sheen {roughness}"), gltf(Parameters { sheen_color: color, sheen_roughness: 1.0, ..p }), false, wide);
         let stretched = Parameters { anisotropy: 0.6, ..p };
-        add(format!("gltf stretched {roughness}"), gltf(stretched), false, wide);
-        add(format!("gltf stretched metal {roughness}"), gltf(Parameters { metallic: 1.0, ..stretched }), false, false);
+        add(format!("gltf stretched {roughness}"), gltf(stretched), true, wide);
+        add(format!("gltf stretched metal {roughness}"), gltf(Parameters { metallic: 1.0, ..stretched }), true, false);
         let all = Parameters {
             base_color: color,
             metallic: 0.2,
