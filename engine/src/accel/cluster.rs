@@ -53,13 +53,11 @@ struct Clusters {
 impl Clusters {
     fn new(boxes: &[Box3]) -> Self {
         let order = along_curve(boxes);
-        let column = |value: &dyn Fn(&Box3) -> f32| {
-            let mut column: Vec<f32> = Vec::with_capacity(order.len() + WINDOW);
-            column.extend(order.iter().map(|&at| value(&boxes[at as usize])));
-            column.resize(order.len() + WINDOW, 0.0);
-            column
+        let column = |i: usize| {
+            let value = |b: &Box3| if i < 3 { b.min[i] } else { b.max[i - 3] };
+            parallel::map(order.len() + WINDOW, |at| order.get(at).map_or(0.0, |&at| value(&boxes[at as usize])))
         };
-        let bounds = std::array::from_fn(|i| if i < 3 { column(&|b| b.min[i]) } else { column(&|b| b.max[i - 3]) });
+        let bounds = std::array::from_fn(column);
         let mut clusters = Self { bounds, below: order.iter().map(|&at| Below::Leaf(at)).collect(), count: order.len() };
         clusters.put_padding();
         clusters

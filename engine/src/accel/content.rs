@@ -7,7 +7,7 @@ use super::{
     collapse::{Collapse, LeafRule},
     frame::Normalisation,
     pack::{Pack, PackTriangle},
-    parallel,
+    pages, parallel,
     split::{References, split},
     tree::{OTHER, Tree},
     triangles::Triangles,
@@ -71,7 +71,7 @@ impl<'a> Content<'a> {
         };
         let collapsed = plan.carry_out(leaf);
         let pack = |at: usize| Pack::new(packed[begins[at]..begins[at + 1]].iter().map(|&triangle| soup.triangle(triangle)));
-        let packs = parallel::map(begins.len() - 1, pack);
+        let packs = pages::fill(begins.len() - 1, pack);
         Tree::new(frame, collapsed, packs, triangles.is_split())
     }
 

@@ -1,13 +1,19 @@
-//! Memory for large trees: in large pages, where the system has them, so that a walk does not wait for addresses to be translated.
+//! Memory for large trees: in large pages, where the system has them, so that a walk does not wait for addresses to be translated. All threads of the caller's pool fill it: a
+//! system takes long to hand out pages.
 
 use rayon::prelude::*;
 
-/// The same values, in memory of their own that is as large as they are. All threads of the caller's pool copy: a system takes long to hand out pages.
+/// `f` of all numbers below `count`, in memory that is as large as they are.
+pub fn fill<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    let mut all = Vec::with_capacity(count);
+    ask_for_large_pages(&mut all);
+    all.par_extend((0..count).into_par_iter().with_min_len((1 << 20) / size_of::<T>().max(1)).map(f));
+    all
+}
+
+/// The same values.
 pub fn settle<T: Copy + Send + Sync>(from: Vec<T>) -> Vec<T> {
-    let mut to = Vec::with_capacity(from.len());
-    ask_for_large_pages(&mut to);
-    to.par_extend(from.par_iter().with_min_len((1 << 20) / size_of::<T>()));
-    to
+    fill(from.len(), |at| from[at])
 }
 
 #[cfg(target_os = "linux")]

@@ -33,9 +33,9 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// From what a planned tree became; see [`super::content::Content`].
+    /// From what a planned tree became, and packs in memory of [`super::pages`]; see [`super::content::Content`].
     pub(super) fn new(frame: Normalisation, collapsed: Collapsed, packs: Vec<Pack>, is_split: bool) -> Self {
-        Self { frame, nodes: settle(collapsed.nodes), packs: settle(packs), root: collapsed.root, is_split }
+        Self { frame, nodes: settle(collapsed.nodes), packs, root: collapsed.root, is_split }
     }
 
     /// Its coordinates.

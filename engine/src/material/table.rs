@@ -3,6 +3,7 @@
 use std::f64::consts::FRAC_2_PI;
 
 use glam::{DVec2, DVec3};
+use rayon::prelude::*;
 
 use super::microfacet::{Ggx, SMOOTH_ALPHA};
 use crate::math::atan2;
@@ -68,26 +69,26 @@ pub trait Fill<const K: usize> {
 
 impl<const K: usize> Table<K> {
     /// A table for one roughness.
-    pub fn fixed<F: Fill<K>>(ggx: &Ggx, fill: &F) -> Self {
+    pub fn fixed<F: Fill<K> + Sync>(ggx: &Ggx, fill: &F) -> Self {
         let alpha = ggx.alpha();
         if alpha.x == alpha.y {
             let mut table = Self { rows: Rows::Fixed, bend: fill.bend(), nodes: vec![row(ggx, DVec2::X, fill)], means: Vec::new() };
             table.means = vec![table.mean_of(fill, alpha.x, 0.0)];
             return table;
         }
-        let rows = (0..AZIMUTHS).step_by(EVERY).map(|at| row(ggx, azimuth(alpha, grid(at, AZIMUTHS)), fill)).collect();
+        let rows = computed(AZIMUTHS, |at| row(ggx, azimuth(alpha, grid(at, AZIMUTHS)), fill));
         let mut table = Self { rows: Rows::Azimuth(alpha), bend: fill.bend(), nodes: denser(rows), means: Vec::new() };
         table.means = vec![table.mean_of_azimuths(fill, alpha)];
         table
     }
 
     /// A table for all isotropic roughnesses.
-    pub fn over_roughness<F: Fill<K>>(fill: &F) -> Self {
+    pub fn over_roughness<F: Fill<K> + Sync>(fill: &F) -> Self {
         let exact = |at: usize| {
             let alpha = squared(grid(at, ROUGHNESSES));
             row(&Ggx::clamped([alpha; 2]), DVec2::X, fill)
         };
-        let mut nodes = denser((0..ROUGHNESSES).step_by(EVERY).map(exact).collect());
+        let mut nodes = denser(computed(ROUGHNESSES, exact));
         // The first rows differ most in proportion.
         for (at, row) in nodes.iter_mut().enumerate().take(EVERY).skip(1) {
             *row = exact(at);
@@ -99,7 +100,7 @@ impl<const K: usize> Table<K> {
             let mean = table.mean_of(fill, alpha, roughness_row(alpha));
             std::array::from_fn(|k| if F::FALLING[k] { mean[k] / alpha } else { mean[k] })
         };
-        table.means = (0..=MEANS).map(means).collect();
+        table.means = (0..=MEANS).into_par_iter().map(means).collect();
         table
     }
 
@@ -177,6 +178,11 @@ impl<const K: usize> Table<K> {
         }
         sum
     }
+}
+
+/// Those of so many rows that are computed, by all threads of the pool.
+fn computed<const K: usize>(rows: usize, row: impl Fn(usize) -> [[f64; K]; NODES] + Sync + Send) -> Vec<[[f64; K]; NODES]> {
+    (0..rows).step_by(EVERY).collect::<Vec<_>>().into_par_iter().map(row).collect()
 }
 
 /// The cell of an even grid of `nodes` in which `x` lies, and the place in it.

@@ -82,6 +82,16 @@ pub async fn each_job<F: Future<Output = Result<()>>>(jobs: &Jobs, said: &str, a
     failed.map_or(Ok(()), Err)
 }
 
+/// Writes a job's assets into a folder, each whole or not at all. What cannot be written will be sent.
+fn put_assets(folder: &Path, description: &JobDescription, assets: &MemoryAssets) {
+    for (id, path) in description.assets.iter().map(|id| (id, folder.join(id.to_string()))).filter(|(_, path)| !path.exists()) {
+        let Some((bytes, mut file)) = assets.bytes(*id).zip(tempfile::NamedTempFile::new_in(folder).ok()) else { continue };
+        if file.write_all(&bytes).is_ok() {
+            let _ = file.persist(path);
+        }
+    }
+}
+
 fn job_range(text: &str) -> Result<(u64, u64), String> {
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let (first, last) = (job_number(first)?, job_number(last)?);
@@ -93,6 +103,8 @@ pub struct Client {
     endpoint: Endpoint,
     connection: Connection,
     address: String,
+    /// Where the coordinator has its assets, if that is known and this machine's.
+    assets: Option<PathBuf>,
 }
 
 impl Client {
@@ -109,7 +121,12 @@ impl Client {
         let connecting = patiently(address, timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket))).await;
         let late = || Err(Refusal::other(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())));
         let connection = connecting.unwrap_or_else(|_| late()).map_err(|refusal| unreachable(address, refusal))?;
-        Ok(Self { endpoint, connection, address: address.to_owned() })
+        Ok(Self { endpoint, connection, address: address.to_owned(), assets: None })
+    }
+
+    /// Puts assets into this folder, where its coordinator has its own: what is there need not be sent.
+    pub fn beside(self, assets: PathBuf) -> Self {
+        Self { assets: Some(assets), ..self }
     }
 
     /// Ends the connection.
@@ -123,6 +140,9 @@ impl Client {
     /// # Errors
     /// When the coordinator refuses the job or is lost.
     pub async fn submit(&self, description: &JobDescription, assets: &MemoryAssets, terms: &Terms) -> Result<JobId> {
+        if let Some(folder) = &self.assets {
+            tokio::task::block_in_place(|| put_assets(folder, description, assets));
+        }
         let request = Request::Submit { description: Box::new(description.clone()), terms: terms.clone() };
         let (mut send, mut receive) = self.request(&request).await?;
         let wanted = match self.response(&mut receive).await? {

@@ -2,7 +2,7 @@
 
 use std::{
     net::{Ipv4Addr, SocketAddr},
-    path::Path,
+    path::{Path, PathBuf},
     process::{ExitStatus, Stdio},
 };
 
@@ -11,7 +11,7 @@ use tokio::{
     task::JoinSet,
 };
 
-use super::{client::Client, progress::Progress};
+use super::client::Client;
 use crate::{
     coordinator::{Coordinator, Options, Retention},
     error::{Error, ExitCode, Result},
@@ -21,9 +21,11 @@ use crate::{
 
 /// The farm. Its nodes end with it.
 pub struct LocalFarm {
+    /// Names of the node processes, and their numbers.
+    pub nodes: Vec<(String, u32)>,
     coordinator: Coordinator,
     client: Identity,
-    nodes: JoinSet<(String, std::io::Result<ExitStatus>)>,
+    running: JoinSet<(String, std::io::Result<ExitStatus>)>,
     /// Keys, journal and output, until they are fetched.
     folder: tempfile::TempDir,
 }
@@ -33,7 +35,7 @@ impl LocalFarm {
     ///
     /// # Errors
     /// When the machine gives no port, no processes or no temporary folder.
-    pub async fn start(nodes: u32, lanes: u32, farm: FarmConfig, progress: &Progress) -> Result<Self> {
+    pub async fn start(nodes: u32, lanes: u32, farm: FarmConfig) -> Result<Self> {
         let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start a farm on this machine: {error}"));
         let folder = tempfile::Builder::new().prefix("tessera-").tempdir().map_err(internal)?;
         let authority = Authority::new()?;
@@ -50,19 +52,24 @@ impl LocalFarm {
         };
         let coordinator = Coordinator::start(options).await?;
         let client = authority.issue(Role::Operator, "render")?;
-        let mut local = Self { coordinator, client, nodes: JoinSet::new(), folder };
+        let mut local = Self { nodes: Vec::new(), coordinator, client, running: JoinSet::new(), folder };
         for number in 1..=nodes {
             let name = format!("node-{number}");
             let child = local.spawn(&authority.issue(Role::Node, &name)?, lanes).map_err(internal)?;
-            progress.started(&name, child.id().unwrap_or_default());
-            local.nodes.spawn(wait(name, child));
+            local.nodes.push((name.clone(), child.id().unwrap_or_default()));
+            local.running.spawn(wait(name, child));
         }
         Ok(local)
     }
 
     fn spawn(&self, identity: &Identity, lanes: u32) -> std::io::Result<Child> {
         let keys = identity.save(self.folder.path()).map_err(std::io::Error::other)?;
-        node_command(&self.coordinator.address.to_string(), &keys, lanes)?.spawn()
+        node_command(&self.coordinator.address.to_string(), &keys, lanes)?.arg("--cache").arg(self.assets()).spawn()
+    }
+
+    /// Where the coordinator has its assets: on one machine nodes read them there, and clients put them there.
+    fn assets(&self) -> PathBuf {
+        self.folder.path().join("data/assets")
     }
 
     /// A client of the farm.
@@ -70,7 +77,7 @@ impl LocalFarm {
     /// # Errors
     /// As [`Client::connect`].
     pub async fn client(&self) -> Result<Client> {
-        Client::connect(&self.coordinator.address.to_string(), &self.client).await
+        Ok(Client::connect(&self.coordinator.address.to_string(), &self.client).await?.beside(self.assets()))
     }
 
     /// Waits until a node's process has ended, and says which and how. Never ends while there is no node process at all.
@@ -78,23 +85,23 @@ impl LocalFarm {
     /// # Errors
     /// When it was the last one: nobody is left to render.
     pub async fn node_ended(&mut self) -> Result<String> {
-        let Some(ended) = self.nodes.join_next().await else { return std::future::pending().await };
+        let Some(ended) = self.running.join_next().await else { return std::future::pending().await };
         let said = match ended {
             Ok((name, Ok(status))) => format!("{name}: its process ended ({status})"),
             Ok((name, Err(error))) => format!("{name}: its process ended ({error})"),
             Err(error) => format!("a node's process was lost: {error}"),
         };
-        if self.nodes.is_empty() {
+        if self.running.is_empty() {
             return Err(Error::new(ExitCode::Job, format!("no node is left to render the job; the last one was {said}"))
                 .with_help("earlier output files are as they were"));
         }
         Ok(said)
     }
 
-    /// Ends nodes and coordinator.
+    /// Ends nodes and coordinator. Nobody is told: nobody is left who would come back.
     pub async fn stop(mut self) {
-        self.nodes.shutdown().await;
-        self.coordinator.stop().await;
+        self.running.shutdown().await;
+        self.coordinator.abandon();
     }
 }
 

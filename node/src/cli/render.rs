@@ -67,20 +67,17 @@ pub struct Args {
 /// Runs `tessera render`.
 pub fn run(args: Args) -> Result<()> {
     start_logs("error");
-    let (loaded, scene) = args.script.load()?;
     check_writable(&args.output)?;
-    if let Some(threads) = args.threads {
-        return each_frame(&args.script, (loaded, scene), |loaded, scene| {
-            show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output)?)
-        });
-    }
-    drop(scene);
-    block_on(async {
-        match &args.coordinator {
-            Some(address) => on_farm(address, &args, loaded).await,
-            None => here(&args, loaded).await,
+    match (&args.coordinator, args.threads) {
+        (Some(address), None) => {
+            let (loaded, _) = args.script.load()?;
+            block_on(on_farm(address, &args, loaded))
         }
-    })
+        (_, Some(threads)) => each_frame(&args.script, args.script.load()?, |loaded, scene| {
+            show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output)?)
+        }),
+        (None, None) => block_on(here(&args)),
+    }
 }
 
 async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
@@ -91,11 +88,9 @@ async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
     done
 }
 
-async fn here(args: &Args, loaded: LoadedJob) -> Result<()> {
-    let lanes = args.lanes.unwrap_or_else(|| (cores() / args.nodes).max(1));
-    let no_node_timeout = seconds(args.no_node_timeout)?;
-    let farm = FarmConfig { no_node_timeout, ..FarmConfig::default() };
-    let mut local = LocalFarm::start(args.nodes, lanes, farm, &args.show.progress()).await?;
+async fn here(args: &Args) -> Result<()> {
+    let (loaded, mut local) = loaded_and_started(args).await?;
+    local.nodes.iter().for_each(|(name, process)| args.show.progress().started(name, *process));
     let client = local.client().await?;
     let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes), false);
     tokio::pin!(work);
@@ -110,9 +105,24 @@ async fn here(args: &Args, loaded: LoadedJob) -> Result<()> {
             }
         }
     };
-    client.close().await;
     local.stop().await;
     done
+}
+
+/// Runs the script while a farm starts: neither needs the other. An error of the script is told at once.
+async fn loaded_and_started(args: &Args) -> Result<(LoadedJob, LocalFarm)> {
+    let lanes = args.lanes.unwrap_or_else(|| (cores() / args.nodes).max(1));
+    let farm = FarmConfig { no_node_timeout: seconds(args.no_node_timeout)?, ..FarmConfig::default() };
+    let script = args.script.clone();
+    let loading = tokio::task::spawn_blocking(move || script.load().map(|(loaded, _)| loaded));
+    let loading = async { loading.await.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))? };
+    let starting = LocalFarm::start(args.nodes, lanes, farm);
+    tokio::pin!(loading, starting);
+    tokio::select! {
+        biased;
+        loaded = &mut loading => Ok((loaded?, starting.await?)),
+        local = &mut starting => Ok((loading.await?, local?)),
+    }
 }
 
 /// Submits what a script says, shows how it fares, fetches its files. Whether jobs go on when the user leaves.

@@ -19,6 +19,9 @@ pub fn start_logs(default: &str) {
     let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).with_ansi(colors).with_target(false).try_init();
 }
 
+/// Room for scripts that call themselves, as the main thread has it.
+const STACK: usize = 8 << 20;
+
 /// A runtime with two threads: the network's work is small.
 ///
 /// # Errors
@@ -26,6 +29,7 @@ pub fn start_logs(default: &str) {
 pub fn runtime() -> Result<Runtime> {
     tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
+        .thread_stack_size(STACK)
         .enable_all()
         .build()
         .map_err(|error| Error::new(ExitCode::Internal, format!("cannot start: {error}")))

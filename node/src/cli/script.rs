@@ -10,7 +10,7 @@ use crate::{
 };
 
 /// A job script and its parameters.
-#[derive(clap::Args)]
+#[derive(Clone, clap::Args)]
 pub struct Script {
     /// The job script.
     #[arg(value_name = "JOB")]

@@ -196,6 +196,11 @@ impl Coordinator {
         self.pulse.clone()
     }
 
+    /// Ends without a word to anybody.
+    pub fn abandon(self) {
+        self.tasks.iter().for_each(JoinHandle::abort);
+    }
+
     /// Ends: connections are closed so that nodes keep what they hold and look for the coordinator again.
     pub async fn stop(self) {
         self.endpoint.close(CLOSE_RESUME.into(), b"the coordinator ends");

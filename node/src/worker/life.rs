@@ -153,13 +153,12 @@ impl Life {
 
     fn prove(&self, seed: u64) {
         let done = self.done.clone();
-        self.lanes.add(
-            move || part::canary_hash(seed).map_err(|error| error.to_string()),
-            move |result| match result.and_then(|result| result) {
+        self.lanes.add(self.lanes.shared(move || part::canary_hash(seed).map_err(|error| error.to_string())), move |result| {
+            match result.and_then(|result| result) {
                 Ok(hash) => drop(done.send(Done::Say(FromNode::Proof { hash }))),
                 Err(error) => tracing::error!(error, "the canary part cannot be rendered"),
-            },
-        );
+            }
+        });
     }
 
     fn prepare(&mut self, job: JobId, frame: AssetId, assets: Vec<AssetId>) -> Reaction {
