@@ -1,8 +1,8 @@
 //! The film: the whole frame, put together from parts.
 
 use crate::{
-    description::Aovs,
-    part::{Rect, RenderedPart},
+    description::{Aov, Aovs},
+    part::{Rect, RenderedPart, joined},
 };
 
 /// The pixels of a frame.
@@ -106,6 +106,30 @@ impl Film {
         Ok(())
     }
 
+    /// The film of twice as many samples, of which `second` holds the later half: all but where numbers end, it has the bits of one for which all samples were taken at once. Both halves are of 2^n
+    /// samples. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are of different sizes.
+    pub fn joined(&self, second: &Self) -> Option<Self> {
+        let known = |aov: Aov| matches!(aov, Aov::Residual | Aov::Object | Aov::Material | Aov::Samples);
+        let alike = (self.width, self.height, self.aovs) == (second.width, second.height, second.aovs);
+        if !alike || !self.aovs.contains(Aov::Residual) || !self.aovs.iter().all(known) {
+            return None;
+        }
+        let numbers = self.aovs.numbers();
+        // The last of all, and so of these.
+        let residual = numbers - Aov::Residual.channels().len();
+        let samples = self.aovs.channels().position(|channel| Aov::Samples.channels().contains(&channel));
+        let mut film = self.clone();
+        let pixels = film.pixels.iter_mut().zip(film.extra.chunks_exact_mut(numbers));
+        for ((pixel, extra), (other, beside)) in pixels.zip(second.pixels.iter().zip(second.extra.chunks_exact(numbers))) {
+            let low = |extra: &[f32]| std::array::from_fn(|i| extra[residual + i]);
+            let [high, rest] = joined([[*pixel, low(extra)], [*other, low(beside)]]);
+            *pixel = high;
+            extra[residual..].copy_from_slice(&rest);
+            samples.into_iter().for_each(|at| extra[at] += beside[at]);
+        }
+        Some(film)
+    }
+
     /// BLAKE3 of the pixels: little-endian f32, red, green, blue, row by row from the top; behind each row the numbers that it has beside colours.
     pub fn hash(&self) -> [u8; 32] {
         let mut hasher = blake3::Hasher::new();
@@ -133,7 +157,7 @@ pub(crate) fn hash_row(hasher: &mut blake3::Hasher, row: &[f32]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{description::Aov, part::Counters};
+    use crate::part::Counters;
 
     /// A part whose pixels tell their own place.
     fn part(x: u32, y: u32, width: u32, height: u32) -> RenderedPart {

@@ -431,6 +431,8 @@ pub const MODEL_PARTS: usize = 4096;
 
 /// Samples of a pixel.
 pub const SAMPLES_PER_PIXEL: u32 = 1 << 16;
+/// Highest number of a job's first sample: numbers of scripts are exact up to here.
+pub const FIRST_SAMPLE: u64 = 1 << 53;
 
 // ---- Reports -----------------------------------------------------------------------------------------------------------
 

@@ -69,6 +69,7 @@ local tessera = { probe = {}, split = {}, assign = {} }
 -- @api job: quality
 ---@class tessera.Quality
 ---@field samples number samples in every pixel
+---@field first? number number of the first of them
 
 -- @api job: output
 ---@class tessera.Output
@@ -76,7 +77,7 @@ local tessera = { probe = {}, split = {}, assign = {} }
 ---@field png? string|false a preview; false: none
 ---@field pixel_type? "float"|"half" 32 or 16 bits a number in the EXR
 ---@field exposure? number brightness of the preview: radiance is multiplied by 2^exposure
----@field aovs? ("albedo"|"normal"|"depth"|"position"|"object"|"material"|"samples"|"error")[] what the EXR tells of each pixel beside its colour
+---@field aovs? ("albedo"|"normal"|"depth"|"position"|"object"|"material"|"samples"|"error"|"residual")[] what the EXR tells of each pixel beside its colour
 
 -- @api job: frames
 ---@class tessera.Frames

@@ -97,7 +97,7 @@ pub fn frame(width: u32, height: u32) -> Frame {
         camera: Camera::pinhole(eye, look_at, [0.0, 1.0, 0.0], 45.0),
         film: Film { width, height, filter: Filter::Point },
         render: Render::Whitted { max_depth: 8, transparent_shadows: true, min_weight: 1.0 / 255.0 },
-        quality: Quality { samples: 1 },
+        quality: Quality::of(1),
         seed: 0,
         aovs: Aovs::NONE,
     }

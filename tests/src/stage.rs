@@ -131,7 +131,7 @@ impl Stage {
 
     /// The frame that a camera sees.
     pub fn frame(&self, camera: Camera, film: Film, render: Render) -> Frame {
-        Frame { scene: self.scene.clone(), camera, film, render, quality: Quality { samples: 1 }, seed: 1, aovs: Aovs::NONE }
+        Frame { scene: self.scene.clone(), camera, film, render, quality: Quality::of(1), seed: 1, aovs: Aovs::NONE }
     }
 
     /// The scene compiled for that.

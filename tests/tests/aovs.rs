@@ -10,7 +10,7 @@ use tessera_tests::farm::{Program, manifest};
 
 const BINARY: &str = env!("CARGO_BIN_EXE_tessera-under-test");
 
-const WORDS: &str = r#"aovs = { "error", "albedo", "normal", "depth", "position", "object", "material", "samples" }"#;
+const WORDS: &str = r#"aovs = { "error", "albedo", "normal", "depth", "position", "object", "material", "samples", "residual" }"#;
 
 /// A ball on a floor, seen from above with some sky; every part is rendered twice and compared.
 fn job(output: &str) -> String {
@@ -25,7 +25,8 @@ return tessera.job {{
   camera = tessera.perspective {{ eye = {{100, 2, -6}}, look_at = {{100, 1.5, 0}}, fov = 60 }},
   film = {{ width = 48, height = 40, filter = "gaussian" }},
   render = tessera.path {{}},
-  quality = {{ samples = 5 }},
+  quality = {{ samples = tessera.param("samples", 5) }},
+  seed = tessera.param("seed", 0),
   split = tessera.split.grid {{ size = 13 }},
   audit = 1,
   output = {{ {output} }},
@@ -71,7 +72,7 @@ fn a_farm_tells_all_that_one_process_tells_and_colours_stay_what_they_are() {
     assert_eq!(["object.ID", "material.ID", "albedo.R", "normal.Y", "position.Y"].map(|name| at(24, 39, name)), [1.0, 1.0, 0.5, 1.0, 0.0]);
     assert!((0..48 * 40).any(|i| at(i % 48, i / 48, "error.G") > 0.0));
 
-    assert_eq!(manifest(&program.path("farm/all.manifest.json"))["image"]["aovs"].as_array().map(Vec::len), Some(8));
+    assert_eq!(manifest(&program.path("farm/all.manifest.json"))["image"]["aovs"].as_array().map(Vec::len), Some(9));
     assert!(manifest(&program.path("farm/plain.manifest.json"))["image"]["aovs"].is_null());
     for name in ["farm/all.exr", "farm/plain.exr"] {
         let verified = program.run(&["verify", name]);
@@ -84,4 +85,41 @@ fn a_farm_tells_all_that_one_process_tells_and_colours_stay_what_they_are() {
     let checked = |script: &str| program.run(&["check", script]).lines.concat();
     assert!(checked("all.lua").contains("albedo, normal, depth, position, object, material, samples, error"), "{}", checked("all.lua"));
     assert!(!checked("plain.lua").contains("aovs"), "{}", checked("plain.lua"));
+}
+
+#[test]
+fn a_picture_is_extended_to_the_bytes_of_all_samples_at_once() {
+    let program = Program::new(BINARY);
+    fs::write(program.path("job.lua"), job(r#"aovs = { "samples", "residual" }"#)).unwrap();
+    fs::write(program.path("plain.lua"), job("")).unwrap();
+    let farm = ["--nodes", "2", "--lanes", "1"];
+    let with = |samples: &'static str| [&["--set", samples][..], &farm].concat();
+    let extend = |script: &str, samples: &str, more: &[&str]| {
+        program.run(&[&["render", script, "-o", "out", "--extend", "--set", samples], &farm[..], more].concat())
+    };
+    let missing = extend("job.lua", "samples=8", &[]);
+    assert!(missing.code == Some(4) && missing.errors.contains("an earlier run left"), "{}", missing.errors);
+    render(&program, "job.lua", &with("samples=2"), "out");
+    let two = fs::read(program.path("out/job.exr")).unwrap();
+    for (script, samples, more, code, says) in [
+        ("job.lua", "samples=12", &[][..], 2, "a power of two"),
+        ("plain.lua", "samples=8", &[], 2, "residual"),
+        ("job.lua", "samples=8", &["--set", "seed=1"], 4, "only samples may differ"),
+    ] {
+        let refused = extend(script, samples, more);
+        assert!(refused.code == Some(code) && refused.errors.contains(says), "{:?} {}", refused.code, refused.errors);
+        assert!(fs::read(program.path("out/job.exr")).unwrap() == two, "a refusal changed the picture");
+    }
+    render(&program, "job.lua", &with("samples=16"), "whole");
+    for _ in 0..2 {
+        let extended = extend("job.lua", "samples=16", &[]);
+        assert_eq!(extended.code, Some(0), "{}", extended.errors);
+        for name in ["job.exr", "job.png"] {
+            let of = |folder: &str| fs::read(program.path(&format!("{folder}/{name}"))).unwrap();
+            assert!(of("out") == of("whole"), "{name} is not that of all samples at once");
+        }
+    }
+    let told = &manifest(&program.path("out/job.manifest.json"))["image"];
+    assert_eq!((told["samples"].as_u64(), told["extended_from"].as_u64()), (Some(16), Some(2)));
+    assert_eq!(program.run(&["verify", "out/job.exr"]).code, Some(0));
 }

@@ -22,12 +22,14 @@ pub enum Aov {
     Samples,
     /// Standard error of the pixel's colour, by its samples as if they were independent (they are spread more evenly, so it is less); 0 for a single sample.
     Error,
+    /// What the colour of the pixel, a float of 32 bits, lacks of the mean of its samples, as another one: with it, a picture of 2^n samples can be extended.
+    Residual,
 }
 
 impl Aov {
     /// All of them, in the order in which a pixel holds them.
-    pub const ALL: [Self; 8] =
-        [Self::Albedo, Self::Normal, Self::Depth, Self::Position, Self::Object, Self::Material, Self::Samples, Self::Error];
+    pub const ALL: [Self; 9] =
+        [Self::Albedo, Self::Normal, Self::Depth, Self::Position, Self::Object, Self::Material, Self::Samples, Self::Error, Self::Residual];
 
     /// The depth of nothing, in scene units: finite, as filters of compositors make NaN of what is not.
     pub const FARTHEST: f32 = 1e30;
@@ -48,6 +50,7 @@ impl Aov {
             Self::Material => &["material.ID"],
             Self::Samples => &["samples.N"],
             Self::Error => &["error.R", "error.G", "error.B"],
+            Self::Residual => &["residual.R", "residual.G", "residual.B"],
         }
     }
 

@@ -33,4 +33,13 @@ pub enum Filter {
 pub struct Quality {
     /// Samples in every pixel, at least 1.
     pub samples: u32,
+    /// Number of the first of them: pictures of other samples are independent of each other.
+    pub first: u64,
+}
+
+impl Quality {
+    /// So many samples from number 0 on.
+    pub fn of(samples: u32) -> Self {
+        Self { samples, first: 0 }
+    }
 }

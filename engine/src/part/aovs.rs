@@ -15,18 +15,26 @@ use crate::{
     scene::{Scene, Tracer, Work},
 };
 
-/// The numbers of all pixels of a lattice, each in the order of [`Aovs::channels`]. `errors` are those of their colours, if they are asked for.
-pub fn gather(scene: &Scene, lattice: Lattice, samples: SampleRange, errors: &[DVec3], cancel: &AtomicBool) -> Result<Vec<f32>, Cancelled> {
+/// What the samples of colours tell.
+pub struct Beside {
+    /// Standard errors, if they are asked for.
+    pub errors: Vec<DVec3>,
+    /// What colours lack, which are floats of 32 bits.
+    pub residuals: Vec<[f32; 3]>,
+}
+
+/// The numbers of all pixels of a lattice, each in the order of [`Aovs::channels`]; `beside` is of their colours.
+pub fn gather(scene: &Scene, lattice: Lattice, samples: SampleRange, beside: &Beside, cancel: &AtomicBool) -> Result<Vec<f32>, Cancelled> {
     if scene.aovs.is_empty() {
         return Ok(Vec::new());
     }
-    scene.run(Gathering { lattice, samples, errors, cancel, seen: Seen::default() })
+    scene.run(Gathering { lattice, samples, beside, cancel, seen: Seen::default() })
 }
 
 struct Gathering<'c> {
     lattice: Lattice,
     samples: SampleRange,
-    errors: &'c [DVec3],
+    beside: &'c Beside,
     cancel: &'c AtomicBool,
     seen: Seen,
 }
@@ -37,8 +45,8 @@ impl Work for Gathering<'_> {
     #[inline(always)]
     fn run(mut self, scene: impl Tracer) -> Self::Output {
         let aovs = scene.aovs;
-        let of_hits = aovs.iter().any(|aov| !matches!(aov, Aov::Samples | Aov::Error));
-        let mut errors = self.errors.iter();
+        let of_hits = aovs.iter().any(|aov| !matches!(aov, Aov::Samples | Aov::Error | Aov::Residual));
+        let (mut errors, mut residuals) = (self.beside.errors.iter(), self.beside.residuals.iter());
         let mut numbers = Vec::new();
         for y in self.lattice.rows() {
             if self.cancel.load(Ordering::Relaxed) {
@@ -48,8 +56,8 @@ impl Work for Gathering<'_> {
                 if of_hits {
                     self.look(scene, (x, y));
                 }
-                let error = errors.next().copied().unwrap_or_default();
-                self.seen.tell(aovs, self.samples.count, error, scene.begin(), &mut numbers);
+                let of_color = (errors.next().copied().unwrap_or_default(), residuals.next().copied().unwrap_or_default());
+                self.seen.tell(aovs, self.samples.count, of_color, scene.begin(), &mut numbers);
             }
         }
         Ok(numbers)
@@ -103,7 +111,7 @@ impl Seen {
     }
 
     /// Appends the numbers of a pixel; `begin` is where the scene's coordinates begin in the world.
-    fn tell(&self, aovs: Aovs, samples: u64, error: DVec3, begin: DVec3, numbers: &mut Vec<f32>) {
+    fn tell(&self, aovs: Aovs, samples: u64, (error, residual): (DVec3, [f32; 3]), begin: DVec3, numbers: &mut Vec<f32>) {
         let share = 1.0 / self.samples.max(1) as f64;
         let of_met = 1.0 / self.met.max(1) as f64;
         let [object, material] = self.first;
@@ -119,6 +127,7 @@ impl Seen {
                 Aov::Material => numbers.push(material as f32),
                 Aov::Samples => numbers.push(samples as f32),
                 Aov::Error => numbers.extend(three(error)),
+                Aov::Residual => numbers.extend(residual),
             }
         }
     }

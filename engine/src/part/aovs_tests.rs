@@ -36,7 +36,7 @@ fn frame(before: Vec<(Shape, Material)>, render: Render) -> Frame {
         camera: Camera::pinhole(EYE, [EYE[0], 0.0, EYE[2]], [0.0, 0.0, 1.0], 60.0),
         film: Film { width: SIDE, height: SIDE, filter: Filter::Point },
         render,
-        quality: Quality { samples: 3 },
+        quality: Quality::of(3),
         seed: 1,
         aovs: Aov::ALL.into_iter().collect(),
     }

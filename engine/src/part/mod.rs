@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 pub use canary::{CanaryError, canary, canary_hash};
 pub use counters::Counters;
-pub use pairwise::PairwiseSum;
+pub use pairwise::{PairwiseSum, joined};
 pub use render::{prepared, probe, render};
 pub use rendered::{RenderedPart, WrongLength, hash_of_bytes};
 

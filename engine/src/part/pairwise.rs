@@ -5,7 +5,8 @@ use glam::DVec3;
 /// A sum by a fixed binary tree over the sample index: samples 2k and 2k + 1 are added, then pairs of pairs, and so on.
 ///
 /// Every aligned range of 2^n samples is one node of the tree, so ranges that were summed apart and then added in pairs give the same bits as one
-/// sum of all; extending 64 samples to 4096 gives what 4096 at once would. The error grows with the logarithm of the number of samples
+/// sum of all; extending 64 samples to 4096 gives what 4096 at once would. Each node is rounded to what two floats of 32 bits hold, 49 bits or more, so that a picture can tell
+/// the sums that it was made of (see [`crate::description::Aov::Residual`]). The error grows with the logarithm of the number of samples
 /// (Higham, "Accuracy and Stability of Numerical Algorithms", 4.2). It works as a binary counter: bit n of `count` says whether `nodes[n]`
 /// holds a range of 2^n samples that waits for its sibling.
 #[derive(Clone, Debug)]
@@ -30,10 +31,10 @@ impl PairwiseSum {
     /// Adds the next sample.
     #[inline]
     pub fn push(&mut self, sample: DVec3) {
-        let mut node = sample;
+        let mut node = rounded(sample);
         let mut level = 0;
         while self.count >> level & 1 == 1 {
-            node += self.nodes[level];
+            node = rounded(node + self.nodes[level]);
             level += 1;
         }
         self.nodes[level] = node;
@@ -51,6 +52,30 @@ impl PairwiseSum {
         }
         total
     }
+}
+
+/// As near as two floats of 32 bits come, of which the first is as near as one comes. What no float reaches stays as it is.
+#[inline(always)]
+fn rounded(x: DVec3) -> DVec3 {
+    let of = |x: f64| {
+        let high = f64::from(x as f32);
+        if high.is_finite() { high + f64::from((x - high) as f32) } else { x }
+    };
+    DVec3::new(of(x.x), of(x.y), of(x.z))
+}
+
+/// The mean of two ranges of 2^n samples each, one after the other and aligned, from their own: each the sum of two floats of 32 bits, and so is what comes out, the nearer one
+/// first. All but where numbers end, it has the bits of the mean of all samples at once.
+pub fn joined([first, second]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
+    let mean = |[high, low]: [[f32; 3]; 2]| DVec3::from(high.map(f64::from)) + DVec3::from(low.map(f64::from));
+    apart(rounded(mean(first) + mean(second)) * 0.5)
+}
+
+/// A number as two floats of 32 bits: as near as one comes, but finite, and the rest.
+pub fn apart(mean: DVec3) -> [[f32; 3]; 2] {
+    let high = mean.to_array().map(|x| x.min(f32::MAX.into()) as f32);
+    let low = std::array::from_fn(|i| (mean[i] - f64::from(high[i])).min(f32::MAX.into()) as f32);
+    [high, low]
 }
 
 #[cfg(test)]
@@ -78,8 +103,8 @@ mod tests {
     /// The definition of the tree, written down recursively.
     fn tree(samples: &[DVec3]) -> DVec3 {
         match samples {
-            [one] => *one,
-            _ => tree(&samples[..samples.len() / 2]) + tree(&samples[samples.len() / 2..]),
+            [one] => rounded(*one),
+            _ => rounded(tree(&samples[..samples.len() / 2]) + tree(&samples[samples.len() / 2..])),
         }
     }
 
@@ -109,7 +134,7 @@ mod tests {
                 match sibling {
                     Some(at) => {
                         let (other, _, right) = waiting.swap_remove(at);
-                        waiting.push((first.min(other), 2 * count, left + right));
+                        waiting.push((first.min(other), 2 * count, rounded(left + right)));
                     }
                     None => waiting.push((first, count, left)),
                 }
@@ -129,9 +154,30 @@ mod tests {
     }
 
     #[test]
+    fn two_floats_hold_49_bits() {
+        let mut rng = random(4);
+        for sample in samples(&mut rng, 100_000) {
+            let [high, low] = apart(rounded(sample));
+            let both = DVec3::from(high.map(f64::from)) + DVec3::from(low.map(f64::from));
+            assert_eq!(both, rounded(sample));
+            assert!((both - sample).abs().cmple(sample * 2f64.powi(-49)).all(), "{both} is not {sample}");
+        }
+        assert_eq!(rounded(DVec3::splat(1e300)), DVec3::splat(1e300));
+    }
+
+    #[test]
+    fn halves_join_to_what_all_samples_come_to() {
+        let samples = samples(&mut random(5), 512);
+        let mean = |samples: &[DVec3]| apart(sum(samples) * (1.0 / samples.len() as f64));
+        for count in [1, 2, 64, 256] {
+            assert_eq!(joined([mean(&samples[..count]), mean(&samples[count..2 * count])]), mean(&samples[..2 * count]));
+        }
+    }
+
+    #[test]
     fn other_counts_add_their_aligned_ranges_from_the_shortest() {
         let s = samples(&mut random(3), 7);
-        assert_eq!(sum(&s), ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + s[6]));
+        assert_eq!(sum(&s), tree(&s[..4]) + (tree(&s[4..6]) + tree(&s[6..])));
         assert_eq!(sum(&[]), DVec3::ZERO);
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::{PairwiseSum, spread::Spread};
+use super::{PairwiseSum, pairwise::apart, spread::Spread};
 
 /// Takes the samples of pixels, one pixel after the other.
 pub struct Pixels {
@@ -17,13 +17,23 @@ pub struct Pixels {
     pub means: Vec<[f32; 3]>,
     /// Their standard errors, if these are asked for.
     pub errors: Vec<DVec3>,
+    /// What the means lack, which are floats of 32 bits.
+    pub residuals: Vec<[f32; 3]>,
 }
 
 impl Pixels {
     /// Room for `pixels` of `count` samples each.
     pub fn new(pixels: usize, count: u64, errors: bool) -> Self {
         let spread = errors.then(Box::default);
-        Self { count, taken: 0, sum: PairwiseSum::default(), spread, means: Vec::with_capacity(pixels), errors: Vec::new() }
+        Self {
+            count,
+            taken: 0,
+            sum: PairwiseSum::default(),
+            spread,
+            means: Vec::with_capacity(pixels),
+            errors: Vec::new(),
+            residuals: Vec::with_capacity(pixels),
+        }
     }
 
     /// Takes the next sample.
@@ -39,8 +49,9 @@ impl Pixels {
 
     fn finish(&mut self) {
         let mean = self.sum.total() * (1.0 / self.count as f64);
-        // Finite in f64, but perhaps not in f32.
-        self.means.push(mean.to_array().map(|component| component.min(f32::MAX.into()) as f32));
+        let [mean, residual] = apart(mean);
+        self.means.push(mean);
+        self.residuals.push(residual);
         self.sum.clear();
         if let Some(spread) = &mut self.spread {
             self.errors.push(spread.standard_error());

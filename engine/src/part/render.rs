@@ -4,7 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::{DVec2, DVec3};
 
-use super::{Cancelled, Counters, Rect, RenderedPart, SampleRange, aovs, pixels::Pixels, wave::Wave};
+use super::{
+    Cancelled, Counters, Rect, RenderedPart, SampleRange,
+    aovs::{self, Beside},
+    pixels::Pixels,
+    wave::Wave,
+};
 use crate::{
     description::{Aov, Render},
     integrator::{self, Integrator, Path, Raycast, Whitted, caustics},
@@ -31,8 +36,8 @@ pub fn prepared(scene: Scene) -> Scene {
 /// If `cancel` was set meanwhile; it is looked at once a row.
 pub fn render(scene: &Scene, rect: Rect, samples: SampleRange, cancel: &AtomicBool) -> Result<RenderedPart, Cancelled> {
     let lattice = Lattice { rect, stride: 1 };
-    let Traced { pixels, errors, counters } = trace(scene, lattice, samples, cancel)?;
-    let extra = aovs::gather(scene, lattice, samples, &errors, cancel)?;
+    let Traced { pixels, beside, counters } = trace(scene, lattice, samples, cancel)?;
+    let extra = aovs::gather(scene, lattice, samples, &beside, cancel)?;
     Ok(RenderedPart { rect, pixels, extra, counters })
 }
 
@@ -43,8 +48,8 @@ pub fn render(scene: &Scene, rect: Rect, samples: SampleRange, cancel: &AtomicBo
 /// If `cancel` was set meanwhile; it is looked at once a row.
 pub fn probe(scene: &Scene, cell: Rect, stride: u32, cancel: &AtomicBool) -> Result<u64, Cancelled> {
     let (lattice, samples) = (Lattice { rect: cell, stride }, SampleRange { first: 0, count: 1 });
-    let Traced { errors, counters, .. } = trace(scene, lattice, samples, cancel)?;
-    aovs::gather(scene, lattice, samples, &errors, cancel)?;
+    let Traced { beside, counters, .. } = trace(scene, lattice, samples, cancel)?;
+    aovs::gather(scene, lattice, samples, &beside, cancel)?;
     Ok(counters.camera_rays)
 }
 
@@ -71,10 +76,10 @@ fn middles(first: u32, length: u32, stride: u32) -> impl Iterator<Item = u32> {
     (0..length / stride).map(move |step| first + step * stride + stride / 2)
 }
 
-/// Colours of pixels, and their standard errors, if they are asked for.
+/// Colours of pixels, and what is told of them.
 struct Traced {
     pixels: Vec<[f32; 3]>,
-    errors: Vec<DVec3>,
+    beside: Beside,
     counters: Counters,
 }
 
@@ -137,7 +142,8 @@ impl<I: Integrator> Work for Tracing<'_, I> {
         self.trace(scene);
         let rays = self.integrator.counts();
         let counters = Counters { shadow_rays: rays.shadow, secondary_rays: rays.secondary, ..self.counters };
-        Ok(Traced { pixels: self.pixels.means, errors: self.pixels.errors, counters })
+        let Pixels { means, errors, residuals, .. } = self.pixels;
+        Ok(Traced { pixels: means, beside: Beside { errors, residuals }, counters })
     }
 }
 

@@ -57,7 +57,7 @@ impl Look {
             camera: Camera::pinhole(self.eye, self.at, [0.0, 0.0, 1.0], 10.0),
             film: FilmDescription { width: 1, height: 1, filter: Filter::Point },
             render: self.render,
-            quality: Quality { samples: 1 },
+            quality: Quality::of(1),
             seed: 0,
             aovs: Aovs::NONE,
         };
@@ -250,6 +250,29 @@ fn any_parts_give_the_same_bytes(mut scene: Scene) {
         let mut film = Film::with_aovs(width, height, aovs);
         parts.iter().for_each(|&rect| film.place(&render(&scene, rect, WHOLE, &go).unwrap()).unwrap());
         assert_eq!(film.hash(), whole.hash(), "{aovs:?}");
+    }
+}
+
+#[test]
+fn pictures_are_extended_to_those_of_all_samples_at_once() {
+    let go = AtomicBool::new(false);
+    for mut scene in [busy(), busy_paths()] {
+        scene.aovs = [Aov::Object, Aov::Samples, Aov::Residual].into_iter().collect();
+        let (width, height) = (scene.film.width, scene.film.height);
+        let taken = |first, count| {
+            let mut film = Film::with_aovs(width, height, scene.aovs);
+            film.place(&render(&scene, Rect { x: 0, y: 0, width, height }, SampleRange { first, count }, &go).unwrap()).unwrap();
+            film
+        };
+        let mut film = taken(0, 2);
+        assert!(film.pixels() != taken(2, 2).pixels(), "other samples see the same");
+        for count in [2, 4, 8] {
+            film = film.joined(&taken(count, count)).unwrap();
+            assert_eq!(film.hash(), taken(0, 2 * count).hash());
+        }
+        scene.aovs = Aov::ALL.into_iter().collect();
+        let all = Film::with_aovs(width, height, scene.aovs);
+        assert!(all.joined(&all).is_none() && film.joined(&all).is_none() && Film::new(3, 3).joined(&Film::new(3, 3)).is_none());
     }
 }
 

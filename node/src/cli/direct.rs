@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use tessera_engine::{
-    part::{self, Rect},
+    description::Quality,
+    part::{self, Rect, SampleRange},
     scene::Unbuilt,
 };
 
@@ -24,7 +25,9 @@ pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
     let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| part::prepared(scene.build()));
     let parts = parts(description, threads)?;
-    let (film, counters) = here::parts(&scene, &parts, u64::from(description.frame.quality.samples), threads as usize, |_| ())?;
+    let Quality { samples, first } = description.frame.quality;
+    let samples = SampleRange { first, count: samples.into() };
+    let (film, counters) = here::parts(&scene, &parts, samples, threads as usize, |_| ())?;
     let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;
     write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
     check_samples(counters.invalid_samples, counters.camera_rays)?;

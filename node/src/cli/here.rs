@@ -36,18 +36,18 @@ pub fn threads() -> usize {
 /// None in practice: [`ExitCode::Internal`] where a part does not fit on the film.
 pub fn frame(scene: &Scene, samples: u64, done: impl Fn(Rect) + Sync) -> Result<Film> {
     let squares = split::grid(scene.film.width, scene.film.height, SQUARE, SQUARE);
-    parts(scene, &squares, samples, threads(), done).map(|(film, _)| film)
+    parts(scene, &squares, SampleRange { first: 0, count: samples }, threads(), done).map(|(film, _)| film)
 }
 
-/// Renders parts of a frame with so many threads, which take them in the order given; and counts the work.
+/// Renders these samples of parts of a frame with so many threads, which take them in the order given; and counts the work.
 ///
 /// # Errors
 /// [`ExitCode::Internal`] where a part does not fit on the film.
-pub fn parts(scene: &Scene, rects: &[Rect], samples: u64, threads: usize, done: impl Fn(Rect) + Sync) -> Result<(Film, Counters)> {
+pub fn parts(scene: &Scene, rects: &[Rect], samples: SampleRange, threads: usize, done: impl Fn(Rect) + Sync) -> Result<(Film, Counters)> {
     let film = Film::with_aovs(scene.film.width, scene.film.height, scene.aovs);
     let whole = Mutex::new((film, Counters::default()));
     share_out(rects, threads, |rect| {
-        let rendered = part::render(scene, *rect, SampleRange { first: 0, count: samples }, &AtomicBool::new(false)).map_err(internal)?;
+        let rendered = part::render(scene, *rect, samples, &AtomicBool::new(false)).map_err(internal)?;
         let (film, counters) = &mut *whole.lock().unwrap_or_else(PoisonError::into_inner);
         film.place(&rendered).map_err(internal)?;
         *counters += rendered.counters;

@@ -10,6 +10,7 @@ mod client;
 mod coordinator;
 mod delete;
 mod direct;
+mod extend;
 mod fetch;
 mod here;
 mod join;

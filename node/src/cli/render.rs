@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::{
     client::Client,
-    direct,
+    direct, extend,
     local::LocalFarm,
     node::cores,
     progress::{Show, event},
@@ -58,6 +58,10 @@ pub struct Args {
     /// Seconds that the job waits for any node of this machine.
     #[arg(long, value_name = "SECONDS", default_value_t = NO_NODE_TIMEOUT.as_secs_f64())]
     no_node_timeout: f64,
+    /// Add the samples that are missing to a picture of this job that an earlier run left in the folder: it becomes the one of all samples at once, to the byte. The job asks for the
+    /// AOV "residual", and its samples are a power of two.
+    #[arg(long, conflicts_with = "threads")]
+    extend: bool,
     #[command(flatten)]
     standing: Standing,
     #[command(flatten)]
@@ -127,6 +131,9 @@ async fn loaded_and_started(args: &Args) -> Result<(LoadedJob, LocalFarm)> {
 
 /// Submits what a script says, shows how it fares, fetches its files. Whether jobs go on when the user leaves.
 async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32, go_on: bool) -> Result<()> {
+    if args.extend {
+        return extend::extend(client, &args.script, loaded, args.standing.terms(min_nodes), args.show, &args.output).await;
+    }
     let progress = args.show.progress();
     let taken = |submitted: &Submitted, description: &JobDescription| {
         description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));

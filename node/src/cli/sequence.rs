@@ -107,12 +107,7 @@ pub async fn follow(client: &Client, jobs: &[Submitted], show: Show, output: &Pa
 }
 
 async fn follow_one(client: &Client, of: &Submitted, show: Show, output: &Path) -> Result<()> {
-    let mut progress = show.progress();
-    if of.frame.is_some() {
-        progress.say(&format!("{}job {}", of.label(), of.job.0));
-    }
-    let state = client.watch(of.job, |job, nodes| progress.see(job, nodes)).await?;
-    progress.end();
+    let state = watch(client, of, show).await?;
     let ended = outcome(state.clone());
     if !matches!(state, JobState::Finished | JobState::Incomplete(_)) {
         return ended;
@@ -122,7 +117,26 @@ async fn follow_one(client: &Client, of: &Submitted, show: Show, output: &Path) 
     report(show, &files, &output.join(&of.manifest), &of.warnings)
 }
 
+/// Shows how a job fares until it ends.
+///
+/// # Errors
+/// As [`Client::watch`].
+pub async fn watch(client: &Client, of: &Submitted, show: Show) -> Result<JobState> {
+    let mut progress = show.progress();
+    if of.frame.is_some() {
+        progress.say(&format!("{}job {}", of.label(), of.job.0));
+    }
+    let state = client.watch(of.job, |job, nodes| progress.see(job, nodes)).await?;
+    progress.end();
+    Ok(state)
+}
+
 impl Submitted {
+    /// A job that is no frame of a sequence.
+    pub fn alone(job: JobId, description: &JobDescription) -> Self {
+        Self { job, frame: None, manifest: description.output.manifest.clone(), warnings: description.warnings.clone() }
+    }
+
     fn label(&self) -> String {
         self.frame.map_or_else(String::new, |frame| format!("frame {frame}: "))
     }

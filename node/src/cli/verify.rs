@@ -91,9 +91,10 @@ fn agreed(manifest: &Manifest) -> String {
         count => format!(" with {count} holes that no node could render"),
     };
     let pixels = format!("{} x {} pixels{holes}", manifest.image.width, manifest.image.height);
-    match manifest.image.pixel_type {
-        PixelType::Float => format!("identity, {pixels}, {} parts", manifest.parts.len()),
-        PixelType::Half => format!("identity, {pixels} (parts were hashed before their numbers became half floats)"),
+    match (manifest.image.pixel_type, manifest.image.extended_from) {
+        (_, Some(from)) => format!("identity, {pixels} (extended from {from} samples to {})", manifest.image.samples),
+        (PixelType::Float, None) => format!("identity, {pixels}, {} parts", manifest.parts.len()),
+        (PixelType::Half, None) => format!("identity, {pixels} (parts were hashed before their numbers became half floats)"),
     }
 }
 
@@ -130,7 +131,8 @@ fn disagreements(manifest: &Manifest, picture: &Picture) -> Vec<String> {
     if hexadecimal(&film.hash()) != image.pixels_hash {
         findings.push("pixels are not those that were rendered".to_owned());
     }
-    if image.pixel_type == PixelType::Float {
+    // Parts are those of what was added last.
+    if image.pixel_type == PixelType::Float && image.extended_from.is_none() {
         findings.extend(manifest.parts.iter().filter_map(|part| part_disagreement(part, &image.holes, film)));
     }
     findings

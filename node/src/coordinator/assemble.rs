@@ -121,6 +121,7 @@ pub fn write_pictures(
         width,
         height,
         samples: u64::from(frame.quality.samples),
+        extended_from: None,
         seed: frame.seed,
         image_hash: identity.image_hash,
         pixel_type: noted,

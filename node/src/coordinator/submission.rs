@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
+use tessera_engine::description::Quality;
+
 use crate::{
     farm::JobSpec,
     job::{JobDescription, Output},
     limits::{
-        ASSETS_PER_JOB, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, NODES, PART_BYTES, PARTS_PER_JOB, PIXELS_PER_FRAME,
-        PRIORITY, SAMPLES_PER_PIXEL,
+        ASSETS_PER_JOB, FIRST_SAMPLE, JOBS_AWAITED, LONGEST_PATIENCE, MOST_ATTEMPTS_PER_PART, NODES, PART_BYTES, PARTS_PER_JOB,
+        PIXELS_PER_FRAME, PRIORITY, SAMPLES_PER_PIXEL,
     },
     schedule::{Probe, Split},
     wire::{self, Terms},
@@ -28,7 +30,10 @@ pub fn check(description: &JobDescription, terms: &Terms) -> Result<(), String> 
     if pixels == 0 || pixels > PIXELS_PER_FRAME {
         return Err(format!("a frame of {} x {} pixels; 1 to {PIXELS_PER_FRAME} pixels are allowed", film.width, film.height));
     }
-    let samples = description.frame.quality.samples;
+    let Quality { samples, first } = description.frame.quality;
+    if first > FIRST_SAMPLE {
+        return Err(format!("samples from number {first} on; {FIRST_SAMPLE} at the most is allowed"));
+    }
     if !(1..=SAMPLES_PER_PIXEL).contains(&samples) {
         return Err(format!("{samples} samples a pixel; 1 to {SAMPLES_PER_PIXEL} are allowed"));
     }
@@ -116,6 +121,7 @@ pub fn spec(description: &JobDescription, terms: &Terms, owner: &str) -> JobSpec
         width: frame.film.width,
         height: frame.film.height,
         samples: u64::from(frame.quality.samples),
+        first_sample: frame.quality.first,
         probe: probe.clone(),
         split: split.clone(),
         assign: *assign,

@@ -20,6 +20,8 @@ pub struct JobSpec {
     pub height: u32,
     /// Samples a pixel.
     pub samples: u64,
+    /// Number of the first of them.
+    pub first_sample: u64,
     /// How costs are learned.
     pub probe: Probe,
     /// How the frame is split.
@@ -50,6 +52,7 @@ impl JobSpec {
             width,
             height,
             samples,
+            first_sample: 0,
             probe: Probe::Shared { scale: 1.0 / 16.0 },
             split: Split::Grid { width: 64, height: 64 },
             assign: Assign::EarliestFinish,

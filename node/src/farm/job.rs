@@ -257,7 +257,7 @@ impl Job {
 
     /// The samples of a whole part.
     pub fn all_samples(&self) -> SampleRange {
-        SampleRange { first: 0, count: self.spec.samples }
+        SampleRange { first: self.spec.first_sample, count: self.spec.samples }
     }
 
     /// Whether every part is in the picture, or never will be.

@@ -99,6 +99,7 @@ impl Example {
             width: 64,
             height: 64,
             samples: 4,
+            extended_from: None,
             seed: 0,
             image_hash: "11".repeat(32),
             pixel_type: PixelType::Float,

@@ -74,6 +74,9 @@ pub struct ImageEntry {
     pub height: u32,
     /// Samples a pixel.
     pub samples: u64,
+    /// Samples a pixel of the picture that this one was extended from, step by step; what this manifest tells beside the picture is of the last step, which doubled them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub extended_from: Option<u64>,
     /// Chooses the sample pattern.
     pub seed: u64,
     /// Identity of what is pictured, in hexadecimal.

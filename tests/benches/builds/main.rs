@@ -100,7 +100,7 @@ fn scene(encoded: Vec<u8>) -> (MemoryAssets, Frame) {
         camera: Camera::pinhole([0.0, 0.0, 9.0], [0.0; 3], [0.0, 1.0, 0.0], 45.0),
         film: Film { width: 64, height: 64, filter: Filter::Box },
         render: Render::Raycast,
-        quality: Quality { samples: 1 },
+        quality: Quality::of(1),
         seed: 1,
         aovs: Aovs::NONE,
     };

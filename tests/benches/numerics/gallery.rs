@@ -84,7 +84,7 @@ fn picture(change: Change) -> (Frame, MemoryAssets) {
     ];
     frame.camera = Camera::pinhole(place(0.5, 3.5, 11.0), place(0.25, 0.75, 0.0), [0.0, 1.0, 0.0], 45.0);
     frame.film = Film { width: 160, height: 120, filter: Filter::Box };
-    frame.quality = Quality { samples: 4 };
+    frame.quality = Quality::of(4);
     frame.render = Render::Whitted { max_depth: 6, transparent_shadows: true, min_weight: 0.0 };
     (frame, assets)
 }

@@ -64,7 +64,7 @@ pub fn frame(objects: Vec<Object>) -> Frame {
         camera: Camera::pinhole([0.0, 3.5, 11.0], [0.0, 0.8, 0.0], [0.0, 1.0, 0.0], 45.0),
         film: Film { width: 96, height: 72, filter: Filter::Box },
         render: Render::Raycast,
-        quality: Quality { samples: 1 },
+        quality: Quality::of(1),
         seed: 0,
         aovs: Aovs::NONE,
     }

@@ -256,7 +256,7 @@ fn frame() -> Frame {
         camera: Camera::pinhole([0.5, 1.0, 6.0], [0.0; 3], [0.0, 1.0, 0.0], 40.0),
         film: Film { width: 16, height: 12, filter: Filter::Box },
         render: Render::Whitted { max_depth: 4, transparent_shadows: true, min_weight: 0.01 },
-        quality: Quality { samples: 4 },
+        quality: Quality::of(4),
         seed: 1,
         aovs: [Aov::Depth, Aov::Error].into_iter().collect(),
     }

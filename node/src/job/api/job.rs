@@ -36,7 +36,7 @@ pub const FUNCTIONS: &[Function] = &[Function {
 pub const TABLES: &[(&str, &[&str])] = &[("film", FILM), ("quality", QUALITY), ("output", OUTPUT), ("frames", frames::FRAMES)];
 
 const FILM: &[&str] = &["width", "height", "filter"];
-const QUALITY: &[&str] = &["samples"];
+const QUALITY: &[&str] = &["samples", "first"];
 const OUTPUT: &[&str] = &["exr", "png", "pixel_type", "exposure", "aovs"];
 
 const FILTERS: &[(&str, Filter)] = &[
@@ -71,7 +71,7 @@ fn job(keys: &Keys) -> mlua::Result<Value> {
             _ => None,
         })
     })?;
-    let quality = keys.or("quality", Quality { samples: 4 }, quality)?;
+    let quality = keys.or("quality", Quality::of(4), quality)?;
     let probe = keys.or("probe", Probe::Shared { scale: plan::DEFAULT_SCALE }, |field| probe(&field, &film))?;
     let split = keys.or("split", Policy::BuiltIn(plan::DEFAULT_SPLIT), |field| split(&field, &film))?;
     let assign = keys.or("assign", Policy::BuiltIn(Assign::EarliestFinish), |field| assign(&field))?;
@@ -95,7 +95,10 @@ fn film(field: &Field) -> mlua::Result<Film> {
 
 fn quality(field: Field) -> mlua::Result<Quality> {
     let keys = field.table(QUALITY)?;
-    Ok(Quality { samples: keys.required("samples")?.integer32(1, limits::SAMPLES_PER_PIXEL)? })
+    Ok(Quality {
+        samples: keys.required("samples")?.integer32(1, limits::SAMPLES_PER_PIXEL)?,
+        first: keys.or("first", 0, |field| field.integer(0, limits::FIRST_SAMPLE))?,
+    })
 }
 
 fn probe(field: &Field, film: &Film) -> mlua::Result<Probe> {
