@@ -27,21 +27,31 @@ pub struct LocalFarm {
     client: Identity,
     running: JoinSet<(String, std::io::Result<ExitStatus>)>,
     /// Keys, journal and output, until they are fetched.
-    folder: tempfile::TempDir,
+    folder: PathBuf,
+}
+
+/// A folder for a farm. Whoever holds it lets it go when nobody writes there any more, which is after the runtime that the farm lives in.
+///
+/// # Errors
+/// When the machine gives none.
+pub fn folder() -> Result<tempfile::TempDir> {
+    tempfile::Builder::new().prefix("tessera-").tempdir().map_err(|error| unstarted(&error))
+}
+
+fn unstarted(error: &std::io::Error) -> Error {
+    Error::new(ExitCode::Internal, format!("cannot start a farm on this machine: {error}"))
 }
 
 impl LocalFarm {
-    /// Starts a coordinator and `nodes` node processes of `lanes` rendering threads each.
+    /// Starts within a [`folder`] a coordinator and `nodes` node processes of `lanes` rendering threads each.
     ///
     /// # Errors
     /// When the machine gives no port, no processes or no temporary folder.
-    pub async fn start(nodes: u32, lanes: u32, farm: FarmConfig) -> Result<Self> {
-        let internal = |error: std::io::Error| Error::new(ExitCode::Internal, format!("cannot start a farm on this machine: {error}"));
-        let folder = tempfile::Builder::new().prefix("tessera-").tempdir().map_err(internal)?;
+    pub async fn start(nodes: u32, lanes: u32, farm: FarmConfig, folder: &Path) -> Result<Self> {
         let authority = Authority::new()?;
         let options = Options {
             listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
-            data: folder.path().join("data"),
+            data: folder.join("data"),
             identity: authority.issue(Role::Coordinator, "coordinator")?,
             issuer: None,
             submitter_bytes: u64::MAX,
@@ -52,10 +62,10 @@ impl LocalFarm {
         };
         let coordinator = Coordinator::start(options).await?;
         let client = authority.issue(Role::Operator, "render")?;
-        let mut local = Self { nodes: Vec::new(), coordinator, client, running: JoinSet::new(), folder };
+        let mut local = Self { nodes: Vec::new(), coordinator, client, running: JoinSet::new(), folder: folder.to_owned() };
         for number in 1..=nodes {
             let name = format!("node-{number}");
-            let child = local.spawn(&authority.issue(Role::Node, &name)?, lanes).map_err(internal)?;
+            let child = local.spawn(&authority.issue(Role::Node, &name)?, lanes).map_err(|error| unstarted(&error))?;
             local.nodes.push((name.clone(), child.id().unwrap_or_default()));
             local.running.spawn(wait(name, child));
         }
@@ -63,13 +73,13 @@ impl LocalFarm {
     }
 
     fn spawn(&self, identity: &Identity, lanes: u32) -> std::io::Result<Child> {
-        let keys = identity.save(self.folder.path()).map_err(std::io::Error::other)?;
+        let keys = identity.save(&self.folder).map_err(std::io::Error::other)?;
         node_command(&self.coordinator.address.to_string(), &keys, lanes)?.arg("--cache").arg(self.assets()).spawn()
     }
 
     /// Where the coordinator has its assets: on one machine nodes read them there, and clients put them there.
     fn assets(&self) -> PathBuf {
-        self.folder.path().join("data/assets")
+        self.folder.join("data/assets")
     }
 
     /// A client of the farm.

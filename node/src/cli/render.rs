@@ -12,7 +12,7 @@ use serde_json::json;
 use super::{
     client::Client,
     direct, extend,
-    local::LocalFarm,
+    local::{self, LocalFarm},
     node::cores,
     progress::{Show, event},
     runtime::{block_on, interrupted, start_logs},
@@ -80,7 +80,10 @@ pub fn run(args: Args) -> Result<()> {
         (_, Some(threads)) => each_frame(&args.script, args.script.load()?, |loaded, scene| {
             show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output)?)
         }),
-        (None, None) => block_on(here(&args)),
+        (None, None) => {
+            let folder = local::folder()?;
+            block_on(here(&args, folder.path()))
+        }
     }
 }
 
@@ -92,8 +95,8 @@ async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
     done
 }
 
-async fn here(args: &Args) -> Result<()> {
-    let (loaded, mut local) = loaded_and_started(args).await?;
+async fn here(args: &Args, folder: &Path) -> Result<()> {
+    let (loaded, mut local) = loaded_and_started(args, folder).await?;
     local.nodes.iter().for_each(|(name, process)| args.show.progress().started(name, *process));
     let client = local.client().await?;
     let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes), false);
@@ -114,13 +117,13 @@ async fn here(args: &Args) -> Result<()> {
 }
 
 /// Runs the script while a farm starts: neither needs the other. An error of the script is told at once.
-async fn loaded_and_started(args: &Args) -> Result<(LoadedJob, LocalFarm)> {
+async fn loaded_and_started(args: &Args, folder: &Path) -> Result<(LoadedJob, LocalFarm)> {
     let lanes = args.lanes.unwrap_or_else(|| (cores() / args.nodes).max(1));
     let farm = FarmConfig { no_node_timeout: seconds(args.no_node_timeout)?, ..FarmConfig::default() };
     let script = args.script.clone();
     let loading = tokio::task::spawn_blocking(move || script.load().map(|(loaded, _)| loaded));
     let loading = async { loading.await.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))? };
-    let starting = LocalFarm::start(args.nodes, lanes, farm);
+    let starting = LocalFarm::start(args.nodes, lanes, farm, folder);
     tokio::pin!(loading, starting);
     tokio::select! {
         biased;
