@@ -140,3 +140,19 @@ fn a_policy_that_fails_when_parts_are_redistributed_is_replaced_and_the_manifest
     assert!(warnings.contains("three nodes or nothing"), "{warnings} {}", manifest["events"]);
     assert!(manifest["events"].as_array().unwrap().iter().any(|event| event["kind"] == "policy_replaced"));
 }
+
+/// Neither a job that renders nor one that does not leaves anything among temporary files.
+#[test]
+fn no_farm_leaves_its_folder_behind() {
+    let program = Program::new(BINARY);
+    fs::create_dir(program.path("temporary")).unwrap();
+    fs::write(program.path("broken.lua"), "error('no job')").unwrap();
+    let temporary = format!("TMPDIR={}", program.path("temporary").display());
+    for (script, code) in [("job.lua", 0), ("broken.lua", 3), ("job.lua", 0), ("broken.lua", 3)] {
+        let run = program.start_other("env", &[&temporary, BINARY, "render", script, "--nodes", "3", "--lanes", "1", "-o", "out"]);
+        let finished = run.finish();
+        assert_eq!(finished.code, Some(code), "{}", finished.errors);
+        let left: Vec<_> = fs::read_dir(program.path("temporary")).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(left.is_empty(), "{script} leaves {left:?}");
+    }
+}
