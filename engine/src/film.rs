@@ -106,9 +106,10 @@ impl Film {
         Ok(())
     }
 
-    /// The film of twice as many samples, of which `second` holds the later half: all but where numbers end, it has the bits of one for which all samples were taken at once. Both halves are of 2^n
-    /// samples. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are of different sizes.
-    pub fn joined(&self, second: &Self) -> Option<Self> {
+    /// The film of twice as many samples, of which `second` holds the later half; each half is of `count` samples, a power of two. It has the bits of one for which all samples were taken at once,
+    /// unless pixels are brighter than floats reach. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are
+    /// of different sizes.
+    pub fn joined(&self, second: &Self, count: u64) -> Option<Self> {
         let known = |aov: Aov| matches!(aov, Aov::Residual | Aov::Object | Aov::Material | Aov::Samples);
         let alike = (self.width, self.height, self.aovs) == (second.width, second.height, second.aovs);
         if !alike || !self.aovs.contains(Aov::Residual) || !self.aovs.iter().all(known) {
@@ -122,7 +123,7 @@ impl Film {
         let pixels = film.pixels.iter_mut().zip(film.extra.chunks_exact_mut(numbers));
         for ((pixel, extra), (other, beside)) in pixels.zip(second.pixels.iter().zip(second.extra.chunks_exact(numbers))) {
             let low = |extra: &[f32]| std::array::from_fn(|i| extra[residual + i]);
-            let [high, rest] = joined([[*pixel, low(extra)], [*other, low(beside)]]);
+            let [high, rest] = joined([[*pixel, low(extra)], [*other, low(beside)]], count);
             *pixel = high;
             extra[residual..].copy_from_slice(&rest);
             samples.into_iter().for_each(|at| extra[at] += beside[at]);

@@ -4,6 +4,7 @@ use std::fs;
 
 use tessera_engine::{
     description::{Aov, Aovs},
+    film::Film,
     output::exr,
 };
 use tessera_tests::farm::{Program, manifest};
@@ -110,6 +111,14 @@ fn a_picture_is_extended_to_the_bytes_of_all_samples_at_once() {
         assert!(refused.code == Some(code) && refused.errors.contains(says), "{:?} {}", refused.code, refused.errors);
         assert!(fs::read(program.path("out/job.exr")).unwrap() == two, "a refusal changed the picture");
     }
+    // Whoever changed the picture since, it is no longer what was rendered.
+    let mut picture = exr::read(&program.path("out/job.exr")).unwrap();
+    let pixels = picture.film.pixels().iter().map(|pixel| pixel.map(|component| component * 0.5)).collect();
+    picture.film = Film::from_numbers(48, 40, pixels, picture.film.aovs(), picture.film.extra().to_vec()).unwrap();
+    exr::write(&program.path("out/job.exr"), &picture.film, exr::PixelType::Float, &picture.identity.unwrap()).unwrap();
+    let changed = extend("job.lua", "samples=8", &[]);
+    assert!(changed.code == Some(7) && changed.errors.contains("not those that were rendered"), "{}", changed.errors);
+    fs::write(program.path("out/job.exr"), &two).unwrap();
     render(&program, "job.lua", &with("samples=16"), "whole");
     for _ in 0..2 {
         let extended = extend("job.lua", "samples=16", &[]);
@@ -119,6 +128,10 @@ fn a_picture_is_extended_to_the_bytes_of_all_samples_at_once() {
             assert!(of("out") == of("whole"), "{name} is not that of all samples at once");
         }
     }
+    // As a run leaves it that ended after the first of three files.
+    fs::remove_file(program.path("out/job.png")).unwrap();
+    let extended = extend("job.lua", "samples=16", &[]);
+    assert!(extended.code == Some(0) && program.path("out/job.png").exists(), "{}", extended.errors);
     let told = &manifest(&program.path("out/job.manifest.json"))["image"];
     assert_eq!((told["samples"].as_u64(), told["extended_from"].as_u64()), (Some(16), Some(2)));
     assert_eq!(program.run(&["verify", "out/job.exr"]).code, Some(0));

@@ -54,21 +54,29 @@ impl PairwiseSum {
     }
 }
 
-/// As near as two floats of 32 bits come, of which the first is as near as one comes. What no float reaches stays as it is.
+/// As near as two floats of 32 bits come, of which the first is as near as one comes, and as two floats of means come: in multiples of 2^-126, a mean of up to 2^23 samples keeps all bits of their
+/// sum. Sums that are larger than floats reach are rounded to as many bits.
 #[inline(always)]
 fn rounded(x: DVec3) -> DVec3 {
+    const DARK: f64 = 1.0 / (1u128 << 74) as f64;
+    /// What is added to it is rounded to a multiple of 2^-126.
+    const QUANTUM: f64 = 1.5 * DARK * 4.0;
+    const BRIGHT: f64 = (1u128 << 100) as f64;
     let of = |x: f64| {
-        let high = f64::from(x as f32);
-        if high.is_finite() { high + f64::from((x - high) as f32) } else { x }
+        let x = if x.abs() < DARK { (x + QUANTUM) - QUANTUM } else { x };
+        let unit = if x.abs() > BRIGHT { BRIGHT } else { 1.0 };
+        let y = x * (1.0 / unit);
+        let high = f64::from(y as f32);
+        (high + f64::from((y - high) as f32)) * unit
     };
     DVec3::new(of(x.x), of(x.y), of(x.z))
 }
 
-/// The mean of two ranges of 2^n samples each, one after the other and aligned, from their own: each the sum of two floats of 32 bits, and so is what comes out, the nearer one
-/// first. All but where numbers end, it has the bits of the mean of all samples at once.
-pub fn joined([first, second]: [[[f32; 3]; 2]; 2]) -> [[f32; 3]; 2] {
-    let mean = |[high, low]: [[f32; 3]; 2]| DVec3::from(high.map(f64::from)) + DVec3::from(low.map(f64::from));
-    apart(rounded(mean(first) + mean(second)) * 0.5)
+/// The mean of two ranges of `count` samples each, a power of two, one after the other and aligned, from their own: each the sum of two floats of 32 bits, and so is what comes out, the nearer one
+/// first. It has the bits of the mean of all samples at once, unless that is beyond the largest float.
+pub fn joined([first, second]: [[[f32; 3]; 2]; 2], count: u64) -> [[f32; 3]; 2] {
+    let sum = |[high, low]: [[f32; 3]; 2]| (DVec3::from(high.map(f64::from)) + DVec3::from(low.map(f64::from))) * count as f64;
+    apart(rounded(sum(first) + sum(second)) * (0.5 / count as f64))
 }
 
 /// A number as two floats of 32 bits: as near as one comes, but finite, and the rest.
@@ -162,15 +170,25 @@ mod tests {
             assert_eq!(both, rounded(sample));
             assert!((both - sample).abs().cmple(sample * 2f64.powi(-49)).all(), "{both} is not {sample}");
         }
-        assert_eq!(rounded(DVec3::splat(1e300)), DVec3::splat(1e300));
+        let (huge, tiny) = (rounded(DVec3::splat(1e45)), rounded(DVec3::splat(1e-37)));
+        assert!(
+            (huge / 1e45 - 1.0).abs().max_element() < 2f64.powi(-49) && (tiny / 1e-37 - 1.0).abs().max_element() < 0.1,
+            "{huge} {tiny}"
+        );
     }
 
     #[test]
     fn halves_join_to_what_all_samples_come_to() {
-        let samples = samples(&mut random(5), 512);
-        let mean = |samples: &[DVec3]| apart(sum(samples) * (1.0 / samples.len() as f64));
-        for count in [1, 2, 64, 256] {
-            assert_eq!(joined([mean(&samples[..count]), mean(&samples[count..2 * count])]), mean(&samples[..2 * count]));
+        for scale in [1.0, 1e-22, 1e-27, 1e-31, 1e37, 1e47] {
+            let samples: Vec<_> = samples(&mut random(5), 512).into_iter().map(|sample| sample * scale).collect();
+            let mean = |samples: &[DVec3]| apart(sum(samples) * (1.0 / samples.len() as f64));
+            for count in [1, 2, 64, 256] {
+                assert_eq!(
+                    joined([mean(&samples[..count]), mean(&samples[count..2 * count])], count as u64),
+                    mean(&samples[..2 * count]),
+                    "{scale}"
+                );
+            }
         }
     }
 

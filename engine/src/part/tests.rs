@@ -267,12 +267,12 @@ fn pictures_are_extended_to_those_of_all_samples_at_once() {
         let mut film = taken(0, 2);
         assert!(film.pixels() != taken(2, 2).pixels(), "other samples see the same");
         for count in [2, 4, 8] {
-            film = film.joined(&taken(count, count)).unwrap();
+            film = film.joined(&taken(count, count), count).unwrap();
             assert_eq!(film.hash(), taken(0, 2 * count).hash());
         }
         scene.aovs = Aov::ALL.into_iter().collect();
         let all = Film::with_aovs(width, height, scene.aovs);
-        assert!(all.joined(&all).is_none() && film.joined(&all).is_none() && Film::new(3, 3).joined(&Film::new(3, 3)).is_none());
+        assert!(all.joined(&all, 1).is_none() && film.joined(&all, 1).is_none() && Film::new(3, 3).joined(&Film::new(3, 3), 1).is_none());
     }
 }
 

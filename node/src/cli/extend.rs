@@ -22,7 +22,7 @@ use crate::{
     coordinator::{identity, write_pictures},
     error::{Error, ExitCode, Result},
     job::{JobDescription, LoadedJob, PixelType},
-    manifest,
+    manifest::{self, ImageEntry, Manifest},
     wire::{JobState, Terms},
 };
 
@@ -55,7 +55,10 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
         let job = client.submit(&step, &assets, &terms).await?;
         progress.submitted(job.0);
         let begun = Submitted::alone(job, &step);
-        let parts = tempfile::tempdir().map_err(|error| Error::new(ExitCode::File, format!("a temporary folder: {error}")))?;
+        let parts = tempfile::Builder::new()
+            .prefix("tessera-")
+            .tempdir()
+            .map_err(|error| Error::new(ExitCode::File, format!("a temporary folder: {error}")))?;
         let state = sequence::watch(client, &begun, show).await?;
         outcome(state.clone())?;
         debug_assert!(state == JobState::Finished);
@@ -63,7 +66,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
         files = extension.add(&step, parts.path())?;
     }
     if files.is_empty() {
-        return Ok(());
+        return extension.complete();
     }
     report(show, &files, &folder.join(&description.output.manifest), &description.warnings)
 }
@@ -105,7 +108,13 @@ impl<'a> Extension<'a> {
             other(&format!("it is not the picture of this job with {wanted} samples, nor with a half, a quarter and so on of them"))
                 .with_help("only samples may differ: not the scene, its parameters, the seed, or the program's revision")
         })?;
-        let invalid = manifest::read(&folder.join(&output.manifest)).map_or(0, |manifest| manifest.image.invalid_samples);
+        // That of an earlier picture, where a run ended between the files.
+        let told = manifest::read(&folder.join(&output.manifest)).ok().filter(|told| told.image.image_hash == found.image_hash);
+        if told.as_ref().is_some_and(|told| told.image.pixels_hash != blake3::Hash::from_bytes(film.hash()).to_string()) {
+            return Err(Error::new(ExitCode::Verify, format!("{}: its pixels are not those that were rendered", path.display()))
+                .with_help("it was changed since, or is damaged: render it anew, without --extend"));
+        }
+        let invalid = told.map_or(0, |told| told.image.invalid_samples);
         Ok(Self { description, folder, film, samples, from: samples, invalid })
     }
 
@@ -115,21 +124,42 @@ impl<'a> Extension<'a> {
         (self.samples < self.description.frame.quality.samples).then(|| with(self.description, quality))
     }
 
+    /// Writes what may be missing beside a picture that has all samples.
+    fn complete(&self) -> Result<()> {
+        let path = self.folder.join(&self.description.output.manifest);
+        match manifest::read(&path) {
+            Ok(told) => self.write(told).map(drop),
+            Err(_) => self.write_pictures(self.samples).map(drop),
+        }
+    }
+
     /// Joins what a step came to, and writes the picture. Returns the files.
     fn add(&mut self, step: &JobDescription, parts: &Path) -> Result<Vec<PathBuf>> {
         let read = exr::read(&parts.join(&step.output.exr)).map_err(|error| Error::new(ExitCode::File, error.to_string()))?;
-        let mut told = manifest::read(&parts.join(&step.output.manifest))?;
-        let joined = self.film.joined(&read.film);
+        let told = manifest::read(&parts.join(&step.output.manifest))?;
+        let joined = self.film.joined(&read.film, self.samples.into());
         self.film = joined.ok_or_else(|| Error::new(ExitCode::File, "the pictures of both halves do not fit each other"))?;
         (self.samples, self.invalid) = (self.samples * 2, self.invalid + told.image.invalid_samples);
-        let whole = with(self.description, Quality::of(self.samples));
-        let identity = identity(&whole).map_err(|error| Error::new(ExitCode::Internal, error))?;
-        let image = write_pictures(&whole, &identity, &self.film, &[], self.folder).map_err(|error| Error::new(ExitCode::File, error))?;
-        told.image = manifest::ImageEntry { invalid_samples: self.invalid, extended_from: Some(self.from.into()), ..image };
-        let path = self.folder.join(&whole.output.manifest);
+        self.write(told)
+    }
+
+    /// Writes the picture, and a manifest that tells how it came to be. Returns the files.
+    fn write(&self, mut told: Manifest) -> Result<Vec<PathBuf>> {
+        let image = self.write_pictures(self.samples)?;
+        let is_known = told.image.image_hash == image.image_hash;
+        let extended_from = if is_known { told.image.extended_from } else { Some(self.from.into()) };
+        told.image = ImageEntry { invalid_samples: self.invalid, extended_from, ..image };
+        let output = &self.description.output;
+        let path = self.folder.join(&output.manifest);
         manifest::write(&path, &told)?;
-        let pictures = [Some(&whole.output.exr), whole.output.png.as_ref()].into_iter().flatten().map(|name| self.folder.join(name));
+        let pictures = [Some(&output.exr), output.png.as_ref()].into_iter().flatten().map(|name| self.folder.join(name));
         Ok(pictures.chain([path]).collect())
+    }
+
+    fn write_pictures(&self, samples: u32) -> Result<ImageEntry> {
+        let whole = with(self.description, Quality::of(samples));
+        let identity = identity(&whole).map_err(|error| Error::new(ExitCode::Internal, error))?;
+        write_pictures(&whole, &identity, &self.film, &[], self.folder).map_err(|error| Error::new(ExitCode::File, error))
     }
 }
 

@@ -170,7 +170,11 @@ impl<'a> Field<'_, 'a> {
         };
         let inside =
             if range.open { number > range.lowest && number < range.highest } else { number >= range.lowest && number <= range.highest };
-        if number.is_finite() && inside { Ok(number) } else { Err(self.wrong(range.words).into()) }
+        if number.is_finite() && inside {
+            return Ok(number);
+        }
+        let unsaid = number > range.highest && range.highest < f64::MAX && range.words.ends_with(" up");
+        Err(self.wrong(if unsaid { format!("{}, {:e} at the most", range.words, range.highest) } else { range.words.to_owned() }).into())
     }
 
     pub fn integer(&self, lowest: u64, highest: u64) -> mlua::Result<u64> {
