@@ -107,7 +107,7 @@ impl Film {
     }
 
     /// The film of twice as many samples, of which `second` holds the later half; each half is of `count` samples, a power of two. It has the bits of one for which all samples were taken at once,
-    /// unless pixels are brighter than floats reach. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are
+    /// where pixels lie between 2^-126 and 2^120. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are
     /// of different sizes.
     pub fn joined(&self, second: &Self, count: u64) -> Option<Self> {
         let known = |aov: Aov| matches!(aov, Aov::Residual | Aov::Object | Aov::Material | Aov::Samples);

@@ -22,7 +22,7 @@ pub enum Aov {
     Samples,
     /// Standard error of the pixel's colour, by its samples as if they were independent (they are spread more evenly, so it is less); 0 for a single sample.
     Error,
-    /// What the colour of the pixel, a float of 32 bits, lacks of the mean of its samples, as another one: with it, a picture of 2^n samples can be extended.
+    /// What the colour of the pixel, a float of 32 bits, lacks of the mean of its samples, as another one, times 2^32: with it, a picture of 2^n samples can be extended.
     Residual,
 }
 

@@ -35,7 +35,10 @@ pub struct LocalFarm {
 /// # Errors
 /// When the machine gives none.
 pub fn folder() -> Result<tempfile::TempDir> {
-    tempfile::Builder::new().prefix("tessera-").tempdir().map_err(|error| unstarted(&error))
+    tempfile::Builder::new().prefix("tessera-").tempdir().map_err(|error| {
+        Error::new(ExitCode::Internal, format!("{}: no temporary folder can be made there: {error}", std::env::temp_dir().display()))
+            .with_help("let the environment variable TMPDIR name a folder that can be written and has room")
+    })
 }
 
 fn unstarted(error: &std::io::Error) -> Error {

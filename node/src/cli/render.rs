@@ -135,7 +135,11 @@ async fn loaded_and_started(args: &Args, folder: &Path) -> Result<(LoadedJob, Lo
 /// Submits what a script says, shows how it fares, fetches its files. Whether jobs go on when the user leaves.
 async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32, go_on: bool) -> Result<()> {
     if args.extend {
-        return extend::extend(client, &args.script, loaded, args.standing.terms(min_nodes), args.show, &args.output).await;
+        let extending = extend::extend(client, &args.script, loaded, args.standing.terms(min_nodes), args.show, &args.output);
+        return tokio::select! {
+            done = extending => done,
+            () = interrupted(), if go_on => Err(Error::new(ExitCode::Interrupted, "interrupted").with_help("the farm goes on with the step under way; `tessera list` and `tessera cancel` end that")),
+        };
     }
     let progress = args.show.progress();
     let taken = |submitted: &Submitted, description: &JobDescription| {
