@@ -43,7 +43,7 @@ impl SharedTables {
         Arc::clone(self.dielectric_over_roughness.entry(eta.to_bits()).or_insert_with(make))
     }
 
-    /// Of anisotropic facets of these roughnesses and strengths; see [`Albedo::stretched`].
+    /// Of anisotropic facets of these roughnesses and strengths.
     pub fn stretched(&mut self, roughness: &RangeInclusive<f64>, strength: &RangeInclusive<f64>) -> Arc<Albedo> {
         let make = || Arc::new(Albedo::stretched(roughness, strength));
         let key = [roughness.start(), roughness.end(), strength.start(), strength.end()].map(|x| x.to_bits());

@@ -82,7 +82,7 @@ pub fn joined([first, second]: [[[f32; 3]; 2]; 2], count: u64) -> [[f32; 3]; 2] 
     apart(rounded(sum(first) + sum(second)) * (0.5 / count as f64))
 }
 
-/// A number as two floats of 32 bits: as near as one comes, but finite, and the rest in units of [`UNIT`].
+/// A number as two floats of 32 bits: as near as one comes, but finite, and the rest in units of 2^-32.
 pub fn apart(mean: DVec3) -> [[f32; 3]; 2] {
     let high = mean.to_array().map(|x| x.min(f32::MAX.into()) as f32);
     let rest = |i: usize| (mean[i] - f64::from(high[i])) / UNIT;
