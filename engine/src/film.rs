@@ -107,12 +107,11 @@ impl Film {
     }
 
     /// The film of twice as many samples, of which `second` holds the later half; each half is of `count` samples, a power of two. It has the bits of one for which all samples were taken at once,
-    /// where pixels lie between 2^-126 and 2^120. Of numbers beside colours, both hold the residual, and perhaps object, material and number of samples; `None` if they hold anything else, or are
-    /// of different sizes.
+    /// where pixels lie between 2^-126 and 2^120. Both hold the residual beside colours; `None` if they hold what
+    /// cannot be extended ([`Aov::can_be_extended`]), or are of different sizes.
     pub fn joined(&self, second: &Self, count: u64) -> Option<Self> {
-        let known = |aov: Aov| matches!(aov, Aov::Residual | Aov::Object | Aov::Material | Aov::Samples);
         let alike = (self.width, self.height, self.aovs) == (second.width, second.height, second.aovs);
-        if !alike || !self.aovs.contains(Aov::Residual) || !self.aovs.iter().all(known) {
+        if !alike || !self.aovs.contains(Aov::Residual) || !self.aovs.iter().all(Aov::can_be_extended) {
             return None;
         }
         let numbers = self.aovs.numbers();

@@ -54,6 +54,11 @@ impl Aov {
         }
     }
 
+    /// Whether a picture that tells it can be extended to more samples: see [`crate::film::Film::joined`].
+    pub fn can_be_extended(self) -> bool {
+        matches!(self, Self::Object | Self::Material | Self::Samples | Self::Residual)
+    }
+
     fn bit(self) -> u16 {
         1 << self as u16
     }

@@ -23,7 +23,7 @@ use crate::{
     error::{Error, ExitCode, Result},
     job::{JobDescription, LoadedJob, PixelType},
     manifest::{self, ImageEntry, Manifest},
-    wire::{JobState, Terms},
+    wire::Terms,
 };
 
 /// A picture that is extended to that of a description.
@@ -59,9 +59,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
             .prefix("tessera-")
             .tempdir()
             .map_err(|error| Error::new(ExitCode::File, format!("a temporary folder: {error}")))?;
-        let state = sequence::watch(client, &begun, show).await?;
-        outcome(state.clone())?;
-        debug_assert!(state == JobState::Finished);
+        outcome(sequence::watch(client, &begun, show).await?)?;
         client.fetch(job, parts.path()).await?;
         files = extension.add(&step, parts.path())?;
     }
@@ -77,7 +75,6 @@ impl<'a> Extension<'a> {
         let JobDescription { frame, output, .. } = description;
         let Quality { samples: wanted, first } = frame.quality;
         let path = folder.join(&output.exr);
-        let unknown = |aov: &Aov| !matches!(aov, Aov::Residual | Aov::Object | Aov::Material | Aov::Samples);
         match () {
             () if !wanted.is_power_of_two() => {
                 return Err(refused(&format!("a picture to {wanted} samples")).with_help("take a power of two: 64, 128, 256, ..."));
@@ -90,7 +87,7 @@ impl<'a> Extension<'a> {
             }
             () => {}
         }
-        if let Some(aov) = frame.aovs.iter().find(unknown) {
+        if let Some(aov) = frame.aovs.iter().find(|aov| !aov.can_be_extended()) {
             return Err(refused(&format!("what \"{}\" tells", aov.name())).with_help("leave it out, and render it by a job of its own"));
         }
         let exr::Picture { film, identity: found } = exr::read(&path).map_err(|error| {
@@ -129,7 +126,7 @@ impl<'a> Extension<'a> {
         let path = self.folder.join(&self.description.output.manifest);
         match manifest::read(&path) {
             Ok(told) => self.write(told).map(drop),
-            Err(_) => self.write_pictures(self.samples).map(drop),
+            Err(_) => self.write_pictures().map(drop),
         }
     }
 
@@ -145,7 +142,7 @@ impl<'a> Extension<'a> {
 
     /// Writes the picture, and a manifest that tells how it came to be. Returns the files.
     fn write(&self, mut told: Manifest) -> Result<Vec<PathBuf>> {
-        let image = self.write_pictures(self.samples)?;
+        let image = self.write_pictures()?;
         let is_known = told.image.image_hash == image.image_hash;
         let extended_from = if is_known { told.image.extended_from } else { Some(self.from.into()) };
         told.image = ImageEntry { invalid_samples: self.invalid, extended_from, ..image };
@@ -156,8 +153,8 @@ impl<'a> Extension<'a> {
         Ok(pictures.chain([path]).collect())
     }
 
-    fn write_pictures(&self, samples: u32) -> Result<ImageEntry> {
-        let whole = with(self.description, Quality::of(samples));
+    fn write_pictures(&self) -> Result<ImageEntry> {
+        let whole = with(self.description, Quality::of(self.samples));
         let identity = identity(&whole).map_err(|error| Error::new(ExitCode::Internal, error))?;
         write_pictures(&whole, &identity, &self.film, &[], self.folder).map_err(|error| Error::new(ExitCode::File, error))
     }
