@@ -1,9 +1,12 @@
 //! Rays in blocks, made ready for a tree.
 
+use std::mem::offset_of;
+
 use super::{
-    frame::{BoxRay, Normalisation},
+    frame::{BoxRay, FAR, Normalisation, SHRUNK_AND_GROWN, SMALLEST, largest},
     interleave::WALKERS,
-    pack::PackRay,
+    pack::{PackRay, last_axis},
+    simd::Lanes,
     told::Told,
 };
 use crate::shape::Ray;
@@ -17,19 +20,51 @@ const _: () = assert!(SIZE <= 256 && SIZE.is_multiple_of(8));
 /// Unlike the bits of any three axes: such a ray goes the way of no other.
 const UNSOUND: u32 = 8;
 
+/// A value for each of eight rays.
+pub type Eight = [f32; 8];
+
 /// Rays in a tree's normalised coordinates.
 pub struct Block {
     count: usize,
-    /// For boxes.
-    pub rays: [BoxRay; SIZE],
-    /// For packs of triangles.
+    /// All rays, in their order.
+    pub groups: [Group; SIZE / 8],
+    /// The same for packs of triangles.
     pub filters: [PackRay; SIZE],
-    /// Where boxes stop to matter, by groups of eight; below 0 for a ray that is done.
-    pub limit: [[f32; 8]; SIZE / 8],
-    /// The same for hits, as parameters of the original rays.
+    /// Where hits stop to matter, as parameters of the original rays.
     pub limits: [f64; SIZE],
     /// What each ray under way was told of, by its place among these.
     pub told: [Told; WALKERS],
+    /// Parameters in the tree's coordinates are so many times those of the original rays.
+    ratio: f64,
+}
+
+/// Eight rays that are made ready together, as [`BoxRay`] and [`PackRay`] are one by one.
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+pub struct Group {
+    /// By axis, as all that follow.
+    pub origin: [Eight; 3],
+    pub inverse_near: [Eight; 3],
+    pub inverse_far: [Eight; 3],
+    pub direction: [Eight; 3],
+    /// Where boxes stop to matter; below 0 for a ray that is done.
+    pub limit: Eight,
+    /// See [`BoxRay`].
+    pub negative: [u32; 8],
+    error: Eight,
+    start: [f64; 8],
+}
+
+/// Where the numbers of a ray stand in [`Block::groups`], beside those of the first: in bytes, so that nothing is computed on the way.
+#[derive(Clone, Copy, Default)]
+pub struct Place(usize);
+
+impl Place {
+    /// Of a ray of this number.
+    #[inline(always)]
+    pub fn of(ray: usize) -> Self {
+        Self(ray / 8 * size_of::<Group>() + ray % 8 * size_of::<f32>())
+    }
 }
 
 impl Block {
@@ -38,11 +73,11 @@ impl Block {
     pub fn new() -> Self {
         Self {
             count: 0,
-            rays: [BoxRay::default(); SIZE],
-            filters: [PackRay::default(); SIZE],
-            limit: [[-1.0; 8]; SIZE / 8],
+            groups: [Group::NONE; SIZE / 8],
+            filters: [PackRay::NONE; SIZE],
             limits: [0.0; SIZE],
             told: Default::default(),
+            ratio: 1.0,
         }
     }
 
@@ -50,15 +85,21 @@ impl Block {
     #[inline(always)]
     pub fn fill(&mut self, frame: &Normalisation, rays: &[Ray], limits: &[f64]) {
         self.count = rays.len().min(limits.len()).min(SIZE);
-        for (number, (ray, limit)) in rays.iter().zip(limits).take(SIZE).enumerate() {
-            let mut boxed = frame.ray::<true>(ray.origin, ray.direction);
-            let is_sound = boxed.is_sound();
-            boxed.negative = if is_sound { boxed.negative } else { UNSOUND };
-            self.limits[number] = *limit;
-            // One that is done stays so, however small the tree's unit is.
-            self.limit[number / 8][number % 8] = if is_sound && *limit >= 0.0 { boxed.limit(*limit) } else { -1.0 };
-            self.filters[number] = PackRay::new(&boxed);
-            self.rays[number] = boxed;
+        self.ratio = frame.length(1.0);
+        self.limits[..self.count].copy_from_slice(&limits[..self.count]);
+        self.limits[self.count..self.count.next_multiple_of(8)].fill(-1.0);
+        let full = rays[..self.count].as_chunks::<8>();
+        let (groups, filters) = (&mut self.groups, self.filters.as_chunks_mut::<8>().0);
+        for ((group, filters), rays) in groups.iter_mut().zip(&mut *filters).zip(full.0) {
+            group.fill(filters, frame, rays);
+        }
+        if let [first, ..] = full.1 {
+            let mut rays = [*first; 8];
+            rays[..full.1.len()].copy_from_slice(full.1);
+            groups[full.0.len()].fill(&mut filters[full.0.len()], frame, &rays);
+        }
+        for (group, limits) in self.groups.iter_mut().zip(self.limits.as_chunks::<8>().0).take(self.count.div_ceil(8)) {
+            group.limit(self.ratio, limits);
         }
     }
 
@@ -71,23 +112,179 @@ impl Block {
     /// Whether a ray may meet anything.
     #[inline(always)]
     pub fn is_under_way(&self, ray: usize) -> bool {
-        self.limit[ray / 8][ray % 8] >= 0.0
+        self.groups[ray / 8].limit[ray % 8] >= 0.0
+    }
+
+    /// A number of a ray's: that of the first ray stands here in the first group.
+    ///
+    /// # Safety
+    /// The place is that of a ray below `SIZE`.
+    #[inline(always)]
+    unsafe fn number(&self, first: usize, place: Place) -> f32 {
+        // SAFETY: by this function's own condition, all within the groups.
+        unsafe { *(&raw const self.groups).cast::<f32>().byte_add(first + place.0) }
+    }
+
+    /// Three numbers of a ray's, each in all lanes.
+    ///
+    /// # Safety
+    /// The place is that of a ray below `SIZE`; those of the first ray stand from `first` on. The processor has the instructions of `L`.
+    #[inline(always)]
+    unsafe fn vector<L: Lanes>(&self, first: usize, place: Place) -> [L; 3] {
+        const NEXT: usize = size_of::<Eight>();
+        // SAFETY: by this function's own condition.
+        unsafe {
+            [
+                L::splat(self.number(first, place)),
+                L::splat(self.number(first + NEXT, place)),
+                L::splat(self.number(first + 2 * NEXT, place)),
+            ]
+        }
+    }
+
+    /// Origin and inverse directions of a ray, near and far.
+    ///
+    /// # Safety
+    /// The place is that of a ray below `SIZE`. The processor has the instructions of `L`.
+    #[inline(always)]
+    pub unsafe fn ray<L: Lanes>(&self, place: Place) -> [[L; 3]; 3] {
+        // SAFETY: by this function's own condition.
+        unsafe {
+            [
+                self.vector(offset_of!(Group, origin), place),
+                self.vector(offset_of!(Group, inverse_near), place),
+                self.vector(offset_of!(Group, inverse_far), place),
+            ]
+        }
     }
 
     /// Where boxes stop to matter for a ray.
     ///
     /// # Safety
-    /// The ray is below `SIZE`.
+    /// The place is that of a ray below `SIZE`.
     #[inline(always)]
-    pub unsafe fn limit_of(&self, ray: usize) -> f32 {
+    pub unsafe fn limit_of(&self, place: Place) -> f32 {
         // SAFETY: by this function's own condition.
-        unsafe { *self.limit.as_flattened().get_unchecked(ray) }
+        unsafe { self.number(offset_of!(Group, limit), place) }
     }
 
     /// Sets a parameter of the original ray as its limit; below 0, the ray is done.
     #[inline(always)]
     pub fn set_limit(&mut self, ray: usize, t: f64) {
         self.limits[ray] = t;
-        self.limit[ray / 8][ray % 8] = if t < 0.0 { -1.0 } else { self.rays[ray].limit(t) };
+        let (group, lane) = (&mut self.groups[ray / 8], ray % 8);
+        group.limit[lane] = if t < 0.0 { -1.0 } else { BoxRay::limit_of(t, self.ratio, group.start[lane], group.error[lane]) };
+    }
+}
+
+impl Group {
+    const NONE: Self = Self {
+        origin: [[0.0; 8]; 3],
+        inverse_near: [[0.0; 8]; 3],
+        inverse_far: [[0.0; 8]; 3],
+        direction: [[0.0; 8]; 3],
+        limit: [-1.0; 8],
+        negative: [UNSOUND; 8],
+        error: [0.0; 8],
+        start: [0.0; 8],
+    };
+
+    /// Prepares eight rays of unit direction, but for their limits. Loops over lanes are what compilers turn into vectors.
+    #[inline(always)]
+    fn fill(&mut self, filters: &mut [PackRay; 8], frame: &Normalisation, rays: &[Ray; 8]) {
+        for (lane, ray) in rays.iter().enumerate() {
+            let (origin, direction) = (frame.point(ray.origin).as_vec3(), ray.direction.as_vec3());
+            for axis in 0..3 {
+                self.origin[axis][lane] = origin[axis];
+                self.direction[axis][lane] = direction[axis];
+            }
+        }
+        if self.are_plain() {
+            self.invert();
+            self.prepare(filters);
+        } else {
+            self.fill_one_by_one(filters, frame, rays);
+        }
+    }
+
+    /// Whether all rays are sound and none starts anew: see [`BoxRay`].
+    #[inline(always)]
+    fn are_plain(&self) -> bool {
+        let ([px, py, pz], [dx, dy, dz]) = (&self.origin, &self.direction);
+        (0..8).fold(true, |all, lane| {
+            let is_near = |x: f32| x.abs() <= FAR as f32;
+            // What is no number does not pass either.
+            all & is_near(px[lane]) & is_near(py[lane]) & is_near(pz[lane]) & (dx[lane].abs() + dy[lane].abs() + dz[lane].abs() <= 2.0)
+        })
+    }
+
+    /// Reciprocals of directions for near and far bounds, and their signs, of plain rays.
+    #[inline(always)]
+    fn invert(&mut self) {
+        let (shrunk, grown) = SHRUNK_AND_GROWN;
+        for axis in 0..3 {
+            for lane in 0..8 {
+                let along = self.direction[axis][lane];
+                let raised = if along.abs() > SMALLEST { along.abs() } else { SMALLEST };
+                let inverse = (1.0 / raised).copysign(along);
+                self.inverse_near[axis][lane] = inverse * shrunk;
+                self.inverse_far[axis][lane] = inverse * grown;
+            }
+        }
+        let [x, y, z] = &self.direction;
+        for lane in 0..8 {
+            self.negative[lane] = x[lane].to_bits() >> 31 | (y[lane].to_bits() >> 31) << 1 | (z[lane].to_bits() >> 31) << 2;
+            (self.error[lane], self.start[lane]) = (0.0, 0.0);
+        }
+    }
+
+    /// What packs want to know of plain rays.
+    #[inline(always)]
+    fn prepare(&self, filters: &mut [PackRay; 8]) {
+        let ([px, py, pz], [dx, dy, dz]) = (&self.origin, &self.direction);
+        let (mut last, mut scale, mut magnitude) = ([0; 8], [0.0; 8], [0.0; 8]);
+        for lane in 0..8 {
+            let (x, y, z) = (dx[lane], dy[lane], dz[lane]);
+            last[lane] = last_axis([x.abs(), y.abs(), z.abs(), 0.0]) as u32;
+            let along = match last[lane] {
+                0 => x,
+                1 => y,
+                _ => z,
+            };
+            scale[lane] = 1.0 / along;
+            magnitude[lane] = 1.0 + largest([px[lane].abs(), py[lane].abs(), pz[lane].abs(), 0.0]);
+        }
+        for lane in 0..8 {
+            let (origin, direction) = (|axis: usize| self.origin[axis][lane], |axis: usize| self.direction[axis][lane]);
+            filters[lane] = PackRay::ready(last[lane] as usize, origin, direction, scale[lane], magnitude[lane]);
+        }
+    }
+
+    /// For rays of which one comes from far away, or is no ray.
+    #[cold]
+    #[inline(never)]
+    fn fill_one_by_one(&mut self, filters: &mut [PackRay; 8], frame: &Normalisation, rays: &[Ray; 8]) {
+        for (lane, ray) in rays.iter().enumerate() {
+            let boxed = frame.ray::<true>(ray.origin, ray.direction);
+            for axis in 0..3 {
+                self.origin[axis][lane] = boxed.origin[axis];
+                self.inverse_near[axis][lane] = boxed.inverse_near[axis];
+                self.inverse_far[axis][lane] = boxed.inverse_far[axis];
+                self.direction[axis][lane] = boxed.direction[axis];
+            }
+            self.negative[lane] = if boxed.is_sound() { boxed.negative } else { UNSOUND };
+            (self.error[lane], self.start[lane]) = (boxed.error, boxed.start);
+            filters[lane] = PackRay::new(&boxed);
+        }
+    }
+
+    /// Sets limits, given as parameters of the original rays.
+    #[inline(always)]
+    fn limit(&mut self, ratio: f64, limits: &[f64; 8]) {
+        for lane in 0..8 {
+            let limit = BoxRay::limit_of(limits[lane], ratio, self.start[lane], self.error[lane]);
+            // A ray that is done stays so, however small the tree's unit is.
+            self.limit[lane] = if limits[lane] >= 0.0 && self.negative[lane] != UNSOUND { limit } else { -1.0 };
+        }
     }
 }

@@ -27,7 +27,7 @@ pub const FINEST: f32 = 1.0 / (1 << 23) as f32;
 pub const OUTWARD: f32 = 1.0 / (1 << 21) as f32;
 
 /// From here on a ray starts anew: no component of its place can come to within 1 of the centre sooner.
-const FAR: f64 = 4.0;
+pub(super) const FAR: f64 = 4.0;
 
 /// Most that a ray which started anew may be wrong by for its boxes to be believed.
 const NEARLY: f32 = 1.0 / (1 << 24) as f32;
@@ -51,9 +51,9 @@ pub struct BoxRay {
     /// |origin|.
     size: f32,
     /// Bound on what a ray that started anew is wrong by.
-    error: f32,
+    pub(super) error: f32,
     ratio: f64,
-    start: f64,
+    pub(super) start: f64,
 }
 
 impl Normalisation {
@@ -149,30 +149,25 @@ fn four(v: DVec3) -> [f64; 4] {
 
 /// The largest component, or any if one is no number.
 #[inline(always)]
-fn largest<T: PartialOrd + Copy>([x, y, z, _]: [T; 4]) -> T {
+pub(super) fn largest<T: PartialOrd + Copy>([x, y, z, _]: [T; 4]) -> T {
     let greater = |a: T, b: T| if a > b { a } else { b };
     greater(greater(x, y), z)
 }
 
 /// Components of a direction below this are raised to it: over the distances that matter the change stays far below `OUTWARD`.
-const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
+pub(super) const SMALLEST: f32 = 1.0 / (1u64 << 60) as f32;
 
 /// Factors for reciprocals at near and at far bounds.
+pub(super) const SHRUNK_AND_GROWN: (f32, f32) = (1.0 - 1.0 / (1 << 21) as f32, 1.0 + 1.0 / (1 << 21) as f32);
+
+/// The same for a ray that may have started anew.
 #[inline(always)]
 fn slack(error: f32) -> (f32, f32) {
-    const SLACK: f32 = 1.0 / (1 << 21) as f32;
     // From so far away that boxes cannot tell what it meets, it enters and leaves all of them at once.
-    if error > NEARLY { (0.0, 0.0) } else { (1.0 - SLACK, 1.0 + SLACK) }
+    if error > NEARLY { (0.0, 0.0) } else { SHRUNK_AND_GROWN }
 }
 
 impl BoxRay {
-    /// Origin and near inverse, far inverse and direction.
-    #[inline(always)]
-    pub(super) fn halves(&self) -> &[[f32; 8]; 2] {
-        // SAFETY: in this order they stand at the beginning, one after the other.
-        unsafe { &*(&raw const *self).cast() }
-    }
-
     /// Whether it may meet anything. A ray from where numbers end has none, and every comparison would let it into boxes that are not there. One that started
     /// anew has come to within `FAR` of the centre, if it is to meet anything: where its largest component gets into the tree, so do the
     /// others, not more than 3 later.
@@ -192,7 +187,13 @@ impl BoxRay {
     /// A parameter of the original ray as a limit for boxes, rounded up.
     #[inline(always)]
     pub fn limit(&self, t: f64) -> f32 {
-        (t * self.ratio - self.start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + self.error
+        Self::limit_of(t, self.ratio, self.start, self.error)
+    }
+
+    /// The same of a ray of which only this is known.
+    #[inline(always)]
+    pub(super) fn limit_of(t: f64, ratio: f64, start: f64, error: f32) -> f32 {
+        (t * ratio - start) as f32 * (1.0 + 1.0 / (1 << 20) as f32) + error
     }
 }
 

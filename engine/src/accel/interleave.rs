@@ -3,6 +3,7 @@
 use std::mem::MaybeUninit;
 
 use super::{
+    block::Place,
     node::{LEAF, Node, near_bounds},
     pack::Pack,
     pages::prefetch,
@@ -18,6 +19,7 @@ pub const WALKERS: usize = 12;
 /// A ray under way.
 struct Walker<R> {
     ray: usize,
+    at: Place,
     /// See [`near_bounds`].
     near: [usize; 3],
     /// What it visits next.
@@ -71,7 +73,13 @@ impl<V: Visitor> Stream<'_, V> {
         unsafe {
             while begun < WALKERS.min(numbers.len()) {
                 let place = begun;
-                let walker = walkers.get_unchecked_mut(place).write(Walker { ray: 0, near: [0; 3], current: 0, pending: Pending::new() });
+                let walker = walkers.get_unchecked_mut(place).write(Walker {
+                    ray: 0,
+                    at: Place::default(),
+                    near: [0; 3],
+                    current: 0,
+                    pending: Pending::new(),
+                });
                 self.begin::<R, ANY>(walker, place, numbers, &mut begun);
                 now.note(place as u8, walker.current, self.nodes, self.packs);
             }
@@ -108,9 +116,8 @@ impl<V: Visitor> Stream<'_, V> {
         // SAFETY: by this function's own condition; the ray is one of the block.
         unsafe {
             let node = self.nodes.get_unchecked(walker.current as usize);
-            let ray = block.rays.get_unchecked(walker.ray);
-            let (origin, inverse_near, inverse_far) = (L::splats(&ray.origin), L::splats(&ray.inverse_near), L::splats(&ray.inverse_far));
-            let limit = L::splat(block.limit_of(walker.ray));
+            let [origin, inverse_near, inverse_far] = block.ray::<L>(walker.at);
+            let limit = L::splat(block.limit_of(walker.at));
             let (enter, leave) = node.meet(walker.near, [origin, inverse_near], [origin, inverse_far], limit);
             let met = R::of(enter, leave);
             let (_, next) = met.next();
@@ -135,7 +142,7 @@ impl<V: Visitor> Stream<'_, V> {
     ) -> bool {
         // SAFETY: by this function's own condition; the ray is one of the block, and pending are children of this tree's nodes.
         unsafe {
-            match walker.pending.pop::<L>(self.block.limit_of(walker.ray)) {
+            match walker.pending.pop::<L>(self.block.limit_of(walker.at)) {
                 Some(child) => walker.current = child.reference(self.nodes),
                 None if *begun < numbers.len() => self.begin::<R, ANY>(walker, place, numbers, begun),
                 None => return false,
@@ -149,7 +156,8 @@ impl<V: Visitor> Stream<'_, V> {
     fn begin<R: Copy, const ANY: bool>(&mut self, walker: &mut Walker<R>, place: usize, numbers: &[u8], begun: &mut usize) {
         walker.ray = numbers[*begun].into();
         *begun += 1;
-        walker.near = near_bounds(self.block.rays[walker.ray].negative);
+        walker.at = Place::of(walker.ray);
+        walker.near = near_bounds(self.block.groups[walker.ray / 8].negative[walker.ray % 8]);
         walker.current = self.root;
         walker.pending.clear();
         if ANY {

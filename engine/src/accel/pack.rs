@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// A ray as the filter sees it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PackRay {
     /// The ray's own axes, in which everything else is given: where their coordinates stand beside those of the first axis, in bytes.
     axes: [u32; 3],
@@ -28,7 +28,7 @@ pub struct PackRay {
 
 /// The axis along which a direction of these magnitudes goes most: without branches, of which nobody could foretell the way.
 #[inline(always)]
-fn last_axis([x, y, z, _]: [f32; 4]) -> usize {
+pub(super) fn last_axis([x, y, z, _]: [f32; 4]) -> usize {
     let y_first = usize::from(y > x);
     if z > if y > x { y } else { x } { 2 } else { y_first }
 }
@@ -50,20 +50,27 @@ unsafe fn along<L: Lanes>(points: &[[f32; 8]; 3], axis: u32) -> L {
 }
 
 impl PackRay {
+    /// No ray.
+    pub const NONE: Self = Self { axes: [0; 3], origin: [0.0; 3], shear: [0.0; 2], near: 0.0, slack: 0.0, forward: 0.0 };
+
     /// The same ray. Its own axes are turned so that the direction's largest component comes last.
     #[inline(always)]
     pub fn new(ray: &BoxRay) -> Self {
-        let (direction, origin) = (ray.direction, ray.origin);
-        let [x, y, z] = AXES[last_axis(direction.map(f32::abs))];
-        let scale = 1.0 / direction[z];
-        let magnitude = ray.magnitude(FINEST);
+        let last = last_axis(ray.direction.map(f32::abs));
+        Self::ready(last, |axis| ray.origin[axis], |axis| ray.direction[axis], 1.0 / ray.direction[last], ray.magnitude(FINEST))
+    }
+
+    /// From what is known of a ray: the axis along which it goes most, origin and direction by axis, the reciprocal of the direction along that, and 1 + |origin|.
+    #[inline(always)]
+    pub fn ready(last: usize, origin: impl Fn(usize) -> f32, direction: impl Fn(usize) -> f32, scale: f32, magnitude: f32) -> Self {
+        let [x, y, z] = AXES[last];
         Self {
-            axes: [x, y, z].map(|axis| (axis * AXIS) as u32),
-            origin: [origin[x], origin[y], origin[z]],
-            shear: [direction[x] * scale, direction[y] * scale],
+            axes: [(x * AXIS) as u32, (y * AXIS) as u32, (z * AXIS) as u32],
+            origin: [origin(x), origin(y), origin(z)],
+            shear: [direction(x) * scale, direction(y) * scale],
             near: magnitude * (1.0 / (1 << 22) as f32),
             slack: magnitude * (1.0 / (1 << 17) as f32),
-            forward: direction[z],
+            forward: direction(z),
         }
     }
 

@@ -2,7 +2,7 @@
 //! Shirley, "Geometric and Arithmetic Culling Methods for Entire Ray Packets", 2006), and each child's box is then met by each of them.
 
 use super::{
-    frame::BoxRay,
+    block::{Eight, Group},
     interleave::WALKERS,
     node::{LEAF, Node, far_bound, near_bounds},
     pending::{Left, Pending},
@@ -17,64 +17,38 @@ const WIDEST: f32 = 1.0 / 24.0;
 /// Each ray of a packet has a place among those under way.
 const _: () = assert!(WALKERS >= 8);
 
-/// A value for each of eight rays.
-type Eight = [f32; 8];
-
-/// Eight rays of a block.
+/// What eight rays of a block that go the same way have in common.
 struct Packet {
     near: [usize; 3],
     /// What makes every distance to a near bound least: an origin and an inverse direction.
     near_ray: [[f32; 3]; 2],
     /// And what makes every distance to a far bound greatest.
     far_ray: [[f32; 3]; 2],
-    /// By axis.
-    origin: [Eight; 3],
-    /// By axis.
-    inverse_near: [Eight; 3],
-    /// By axis.
-    inverse_far: [Eight; 3],
 }
 
 impl Packet {
     /// `None` where the rays' directions have different signs, or go far apart, or boxes cannot tell what one of them meets.
-    ///
-    /// # Safety
-    /// The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn of<L: Lanes>(rays: &[BoxRay; 8]) -> Option<Self> {
-        let negative = rays[0].negative;
-        if rays.iter().any(|other| other.negative != negative) {
+    fn of(rays: &Group) -> Option<Self> {
+        let negative = rays.negative[0];
+        if rays.negative.iter().any(|other| *other != negative) {
             return None;
         }
-        // SAFETY: by this function's own condition.
-        let ([[low, near_low], [far_low, least]], [[high, near_high], [far_high, greatest]]) = unsafe { ranges::<L>(rays) };
-        let mut packet = Self {
-            near: near_bounds(negative),
-            near_ray: [[0.0; 3]; 2],
-            far_ray: [[0.0; 3]; 2],
-            origin: [[0.0; 8]; 3],
-            inverse_near: [[0.0; 8]; 3],
-            inverse_far: [[0.0; 8]; 3],
-        };
+        let mut packet = Self { near: near_bounds(negative), near_ray: [[0.0; 3]; 2], far_ray: [[0.0; 3]; 2] };
         for axis in 0..3 {
+            let ((low, high), (least, greatest)) = (range(&rays.origin[axis]), range(&rays.direction[axis]));
             // What is no number is not narrow either.
-            let is_narrow = high[axis] - low[axis] <= WIDEST && greatest[axis] - least[axis] <= WIDEST;
+            let is_narrow = high - low <= WIDEST && greatest - least <= WIDEST;
             if !is_narrow {
                 return None;
             }
+            let (near, far) = (range(&rays.inverse_near[axis]), range(&rays.inverse_far[axis]));
             let is_negative = negative >> axis & 1 == 1;
-            let far_first = |low: f32, high: f32| if is_negative { (low, high) } else { (high, low) };
-            (packet.near_ray[0][axis], packet.far_ray[0][axis]) = far_first(low[axis], high[axis]);
-            packet.near_ray[1][axis] = far_first(near_low[axis], near_high[axis]).1;
-            packet.far_ray[1][axis] = far_first(far_low[axis], far_high[axis]).0;
+            (packet.near_ray[0][axis], packet.far_ray[0][axis]) = if is_negative { (low, high) } else { (high, low) };
+            (packet.near_ray[1][axis], packet.far_ray[1][axis]) = if is_negative { (near.1, far.0) } else { (near.0, far.1) };
             // A ray that enters and leaves all boxes at once has nothing in common with one that does not.
             if packet.near_ray[1][axis] == 0.0 {
                 return None;
-            }
-            for (lane, ray) in rays.iter().enumerate() {
-                packet.origin[axis][lane] = ray.origin[axis];
-                packet.inverse_near[axis][lane] = ray.inverse_near[axis];
-                packet.inverse_far[axis][lane] = ray.inverse_far[axis];
             }
         }
         Some(packet)
@@ -85,55 +59,31 @@ impl Packet {
     /// # Safety
     /// The child is one of the tree's. The processor has the instructions of `L`.
     #[inline(always)]
-    unsafe fn meets<L: Lanes>(&self, limit: &Eight, node: &Node, place: usize) -> u32 {
+    unsafe fn meets<L: Lanes>(&self, rays: &Group, node: &Node, place: usize) -> u32 {
         // SAFETY: by this function's own condition.
         unsafe {
-            let (mut enter, mut leave) = (L::splat(0.0), L::load(limit));
+            let (mut enter, mut leave) = (L::splat(0.0), L::load(&rays.limit));
             for axis in 0..3 {
-                let origin = L::load(&self.origin[axis]);
+                let origin = L::load(&rays.origin[axis]);
                 let near = L::splat(node.bound(self.near[axis], place)).sub(origin);
-                enter = enter.max(near.mul(L::load(&self.inverse_near[axis])));
+                enter = enter.max(near.mul(L::load(&rays.inverse_near[axis])));
                 let far = L::splat(node.bound(far_bound(self.near, axis), place)).sub(origin);
-                leave = leave.min(far.mul(L::load(&self.inverse_far[axis])));
+                leave = leave.min(far.mul(L::load(&rays.inverse_far[axis])));
             }
             enter.le(leave)
         }
     }
 }
 
-/// Origins and near inverses, far inverses and directions: the least of each component, and the greatest.
-type Range = [[[f32; 4]; 2]; 2];
-
-/// The ranges of eight rays, which are sound or all of them done.
-///
-/// # Safety
-/// The processor has the instructions of `L`.
+/// The least and the greatest.
 #[inline(always)]
-unsafe fn ranges<L: Lanes>(rays: &[BoxRay; 8]) -> (Range, Range) {
-    let (mut low, mut high) = ([[0.0; 8]; 2], [[0.0; 8]; 2]);
-    for half in 0..2 {
-        // SAFETY: by this function's own condition.
-        unsafe {
-            let first = L::load(&rays[0].halves()[half]);
-            let (mut least, mut greatest) = (first, first);
-            for ray in &rays[1..] {
-                let next = L::load(&ray.halves()[half]);
-                (least, greatest) = (least.min(next), greatest.max(next));
-            }
-            least.store(&mut low[half]);
-            greatest.store(&mut high[half]);
-        }
-    }
-    let by_vector = |[a, b]: [[f32; 8]; 2]| [a, b].map(|[x, y, z, w, k, l, m, n]| [[x, y, z, w], [k, l, m, n]]);
-    (by_vector(low), by_vector(high))
-}
-
-/// The greatest.
-#[inline(always)]
-fn greatest(of: &Eight) -> f32 {
-    let greater = |a: f32, b: f32| if a > b { a } else { b };
+fn range(of: &Eight) -> (f32, f32) {
+    let (less, greater) = (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
     let [a, b, c, d, e, f, g, h] = *of;
-    greater(greater(greater(a, e), greater(b, f)), greater(greater(c, g), greater(d, h)))
+    (
+        less(less(less(a, e), less(b, f)), less(less(c, g), less(d, h))),
+        greater(greater(greater(a, e), greater(b, f)), greater(greater(c, g), greater(d, h))),
+    )
 }
 
 impl<V: Visitor> Stream<'_, V> {
@@ -146,14 +96,12 @@ impl<V: Visitor> Stream<'_, V> {
         if self.root & LEAF != 0 {
             return false;
         }
-        let Some(rays) = self.block.rays.as_chunks::<8>().0.get(group) else { return false };
-        // SAFETY: by this function's own condition.
-        let Some(packet) = (unsafe { Packet::of::<L>(rays) }) else { return false };
+        let Some(packet) = self.block.groups.get(group).and_then(Packet::of) else { return false };
         if ANY {
             self.block.told.iter_mut().for_each(|told| told.clear());
         }
         let mut pending = Pending::<R>::new();
-        let mut limit = greatest(&self.block.limit[group]);
+        let mut limit = range(&self.block.groups[group].limit).1;
         let mut current = self.root;
         // SAFETY: all are nodes and leaves of this tree, which is never deeper than `MAX_DEPTH`.
         unsafe {
@@ -166,7 +114,7 @@ impl<V: Visitor> Stream<'_, V> {
                 loop {
                     let Some(child) = pending.pop::<L>(limit) else { return true };
                     let node = self.nodes.get_unchecked(child.node as usize);
-                    let mut met = packet.meets::<L>(self.block.limit.get_unchecked(group), node, child.place);
+                    let mut met = packet.meets::<L>(self.block.groups.get_unchecked(group), node, child.place);
                     if met == 0 {
                         continue;
                     }
@@ -180,7 +128,7 @@ impl<V: Visitor> Stream<'_, V> {
                         met &= met - 1;
                         self.visit::<L, ANY>(reference & !LEAF, group * 8 + lane, lane);
                     }
-                    limit = greatest(self.block.limit.get_unchecked(group));
+                    limit = range(&self.block.groups.get_unchecked(group).limit).1;
                     if limit < 0.0 {
                         return true;
                     }
