@@ -288,3 +288,55 @@ impl Group {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::{
+        math::{cos, sin},
+        shape::Bounds,
+    };
+
+    /// Blocks of plain rays, with one from far away or from where numbers end among them or not, full and not: each ray is as it is by itself.
+    #[test]
+    fn rays_are_made_ready_together_as_one_by_one() {
+        let frame = Normalisation::of(Bounds::of([DVec3::new(-3.0, 1.0, 2.0), DVec3::new(5.0, 9.0, 2.5)]));
+        let spread = |i: f64| DVec3::new(sin(i * 1.1), cos(i * 1.7), sin(i * 2.3 + 1.0));
+        let axes = [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::new(0.6, 0.0, -0.8)];
+        let strange = [DVec3::splat(1e9), DVec3::new(1e300, 0.0, 0.0), DVec3::new(0.0, f64::NAN, 0.0), DVec3::splat(f64::INFINITY)];
+        let mut block = Block::new();
+        for turn in 0..200 {
+            let rays: Vec<Ray> = (0..1 + turn % SIZE)
+                .map(|i| {
+                    let (number, place) = ((turn * SIZE + i) as f64, spread(i as f64) * 8.0);
+                    let direction = if i % 7 == 3 { axes[turn % 4] } else { spread(number + 0.5).normalize() };
+                    Ray::new(if turn % 2 == 1 && i == turn % 16 { strange[turn / 2 % 4] } else { place }, direction)
+                })
+                .collect();
+            let limits: Vec<f64> = (0..rays.len()).map(|i| [f64::INFINITY, 3.0, 0.0, -1.0, 1e-30][(i + turn) % 5]).collect();
+            block.fill(&frame, &rays, &limits);
+            assert_eq!(block.len(), rays.len());
+            for (number, (ray, limit)) in rays.iter().zip(limits).enumerate() {
+                let (alone, group, lane) = (frame.ray::<true>(ray.origin, ray.direction), &block.groups[number / 8], number % 8);
+                assert_eq!(block.is_under_way(number), alone.is_sound() && limit >= 0.0 && alone.limit(limit) >= 0.0, "{ray:?}");
+                if !alone.is_sound() {
+                    assert_eq!(group.negative[lane], UNSOUND, "{ray:?}");
+                    continue;
+                }
+                let of = |eights: &[Eight; 3]| eights.each_ref().map(|eight| eight[lane].to_bits());
+                let bits = |[x, y, z, _]: [f32; 4]| [x, y, z].map(f32::to_bits);
+                assert_eq!(of(&group.origin), bits(alone.origin), "{ray:?}");
+                assert_eq!(of(&group.direction), bits(alone.direction), "{ray:?}");
+                assert_eq!(of(&group.inverse_near), bits(alone.inverse_near), "{ray:?}");
+                assert_eq!(of(&group.inverse_far), bits(alone.inverse_far), "{ray:?}");
+                assert_eq!(group.negative[lane], alone.negative, "{ray:?}");
+                assert_eq!(block.filters[number], PackRay::new(&alone), "{ray:?}");
+                if limit >= 0.0 {
+                    assert_eq!(group.limit[lane].to_bits(), alone.limit(limit).to_bits(), "{ray:?}");
+                }
+            }
+        }
+    }
+}
