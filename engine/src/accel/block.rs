@@ -281,10 +281,10 @@ impl Group {
     /// Sets limits, given as parameters of the original rays.
     #[inline(always)]
     fn limit(&mut self, ratio: f64, limits: &[f64; 8]) {
-        for lane in 0..8 {
-            let limit = BoxRay::limit_of(limits[lane], ratio, self.start[lane], self.error[lane]);
+        for (lane, t) in limits.iter().enumerate() {
+            let limit = BoxRay::limit_of(*t, ratio, self.start[lane], self.error[lane]);
             // A ray that is done stays so, however small the tree's unit is.
-            self.limit[lane] = if limits[lane] >= 0.0 && self.negative[lane] != UNSOUND { limit } else { -1.0 };
+            self.limit[lane] = if *t >= 0.0 && self.negative[lane] != UNSOUND { limit } else { -1.0 };
         }
     }
 }
