@@ -42,7 +42,7 @@ pub struct Block {
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 pub struct Group {
-    /// By axis, as all that follow.
+    /// By axis, as the next three.
     pub origin: [Eight; 3],
     pub inverse_near: [Eight; 3],
     pub inverse_far: [Eight; 3],
