@@ -411,6 +411,9 @@ pub const SCRIPT_TIME: Duration = Duration::from_secs(30);
 /// Bytes of one script file.
 pub const SCRIPT_FILE_BYTES: u64 = 8 << 20;
 
+/// Bytes of a Lua file of which native code is made; longer ones are lists that programs wrote: they run once, and that is faster than making code of them.
+pub const SCRIPT_NATIVE_BYTES: usize = 256 << 10;
+
 /// Lua modules of one job.
 pub const SCRIPT_MODULES: usize = 256;
 

@@ -11,7 +11,12 @@ use std::{
 
 use mlua::{Function, Lua, LuaOptions, MultiValue, StdLib, VmState, chunk::ChunkMode};
 
-use super::{context::Context, fault::Fault, library, place::Place};
+use super::{
+    context::{Context, Files},
+    fault::Fault,
+    library,
+    place::Place,
+};
 use crate::limits;
 
 /// What a script may use up.
@@ -40,9 +45,12 @@ impl Sandbox {
     /// A fresh machine that holds the library, but no script yet.
     pub fn new(context: Context, memory: usize) -> Result<Self, Fault> {
         let guard = Arc::new(Guard::default());
+        // Where scripts make scenes; not where they come from others, and only choose.
+        let native = Native(matches!(context.files, Files::Disk));
         let libraries = StdLib::TABLE | StdLib::STRING | StdLib::UTF8 | StdLib::BIT | StdLib::MATH | StdLib::BUFFER | StdLib::VECTOR;
         let make = || {
             let lua = Lua::new_with(libraries, LuaOptions::default())?;
+            lua.set_app_data(native);
             lua.set_app_data(context);
             library::install(&lua, &guard)?;
             lua.sandbox(true)?;
@@ -86,8 +94,14 @@ impl Sandbox {
     }
 }
 
+/// Whether a machine may make native code of what it loads.
+#[derive(Clone, Copy)]
+struct Native(bool);
+
 /// Loads a chunk of source; bytecode is refused.
 pub fn load(lua: &Lua, name: &str, source: &str) -> mlua::Result<Function> {
+    let may_be_native = lua.app_data_ref::<Native>().is_some_and(|native| native.0);
+    lua.enable_jit(may_be_native && source.len() <= limits::SCRIPT_NATIVE_BYTES);
     lua.load(source).set_name(format!("={name}")).set_mode(ChunkMode::Text).into_function()
 }
 
@@ -122,7 +136,11 @@ pub struct Guard {
 struct GuardState {
     deadline: Option<Instant>,
     end: Option<End>,
+    checks: u32,
 }
+
+/// Reading the clock takes longer than a turn of a small loop: it is done at one of so many interrupts.
+const CHECKS: u32 = 16;
 
 impl Guard {
     fn state(&self) -> std::sync::MutexGuard<'_, GuardState> {
@@ -148,7 +166,8 @@ impl Guard {
     /// Fails once the script is ended.
     pub fn check(&self, lua: &Lua) -> mlua::Result<()> {
         let mut state = self.state();
-        if state.end.is_none() && state.deadline.is_some_and(|deadline| Instant::now() > deadline) {
+        state.checks = (state.checks + 1) % CHECKS;
+        if state.checks == 0 && state.end.is_none() && state.deadline.is_some_and(|deadline| Instant::now() > deadline) {
             state.end = Some(End::Time { place: Place::of_running(lua) });
         }
         if state.end.is_some() { Err(Fault::new("the script was ended").into()) } else { Ok(()) }

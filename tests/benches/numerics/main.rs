@@ -1,5 +1,5 @@
 //! The cases of numerical stability that the engine promises, geometry and transforms: `cargo bench -p tessera-tests --bench numerics -- [--rays 1e9]
-//! [CASE...]`.
+//! [CASE...]`. A case is given by its number or by words of what it counts.
 //!
 //! Every case asks the engine about many rays, alone and in streams, on all cores, and prints how many it answered otherwise than geometry does. It
 //! passes if they are no larger a share of all than `allowed`; else the first failures are printed with the bits of their rays. `--rays` replaces the
@@ -30,6 +30,13 @@ struct Case {
     /// Share of the rays that may fail.
     allowed: f64,
     run: fn(u64) -> Tally,
+}
+
+impl Case {
+    /// By its number or by words of what it counts.
+    fn is_called(&self, name: &str) -> bool {
+        name.parse().map_or_else(|_| self.what.contains(name), |number: u32| number == self.number)
+    }
 }
 
 const fn case(number: u32, what: &'static str, rays: u64, run: fn(u64) -> Tally) -> Case {
@@ -69,35 +76,36 @@ const CASES: &[Case] = &[
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
-    let (rays, numbers) = match parse(&arguments) {
+    let (rays, chosen) = match parse(&arguments) {
         Ok(parsed) => parsed,
         Err(wrong) => {
             eprintln!("{wrong}; usage: numerics [--rays COUNT] [CASE...]");
             return ExitCode::from(2);
         }
     };
-    if all_hold(rays, &numbers) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if all_hold(rays, &chosen) { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// Runs cases of these numbers, or all, and prints what came of them: with so many rays, or as many as the table says.
-pub fn all_hold(rays: Option<u64>, numbers: &[u32]) -> bool {
+/// Runs the chosen cases, or all, and prints what came of them: with so many rays, or as many as the table says.
+pub fn all_hold(rays: Option<u64>, chosen: &[String]) -> bool {
     println!("case  {:<72} {:>13} {:>10} {:>8} {:>8}", "counted as failures", "rays", "failures", "allowed", "seconds");
-    let chosen = CASES.iter().filter(|case| numbers.is_empty() || numbers.contains(&case.number));
+    let chosen = CASES.iter().filter(|case| chosen.is_empty() || chosen.iter().any(|name| case.is_called(name)));
     chosen.filter(|case| !passes(case, rays.unwrap_or(case.rays))).count() == 0
 }
 
 /// How many rays, where that is said, and which cases; all if there are none.
-fn parse(arguments: &[String]) -> Result<(Option<u64>, Vec<u32>), String> {
-    let (mut rays, mut numbers, mut rest) = (None, Vec::new(), arguments.iter());
+fn parse(arguments: &[String]) -> Result<(Option<u64>, Vec<String>), String> {
+    let (mut rays, mut chosen, mut rest) = (None, Vec::new(), arguments.iter());
     while let Some(argument) = rest.next() {
         if argument == "--rays" {
             let count = rest.next().and_then(|count| count.parse::<f64>().ok()).filter(|count| *count >= 1.0);
             rays = Some(count.ok_or("--rays needs a number")? as u64);
         } else {
-            numbers.push(argument.parse().map_err(|_| format!("{argument} is no case"))?);
+            let is_known = CASES.iter().any(|case| case.is_called(argument));
+            chosen.push(is_known.then(|| argument.clone()).ok_or_else(|| format!("{argument} is no case"))?);
         }
     }
-    Ok((rays, numbers))
+    Ok((rays, chosen))
 }
 
 /// Runs a case and prints what came of it.
