@@ -27,10 +27,9 @@ pub struct First {
     pub material: u32,
 }
 
-/// What a ray from the camera meets first: path tracing looks through the borders of media, and of what something else fills.
+/// What a ray from the camera meets first, where it meets this surface: path tracing looks through the borders of media, and of what something else fills.
 #[inline(never)]
-pub fn first(scene: impl Tracer, ray: &Ray) -> Option<First> {
-    let surface = scene.closest_from_eye(ray)?;
+pub fn first(scene: impl Tracer, ray: &Ray, surface: Surface) -> Option<First> {
     if !matches!(scene.render, Render::Path { .. }) {
         return Some(seen(scene, &surface, ray, 0.0, None));
     }

@@ -4,15 +4,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
 
-use super::{
-    Cancelled, PairwiseSum, SampleRange,
-    render::{Lattice, camera_ray},
-};
+use super::{Cancelled, PairwiseSum, SampleRange, render::Lattice, wave::Wave};
 use crate::{
     description::{Aov, Aovs},
     integrator::{First, first},
-    sampling::Sampler,
-    scene::{Scene, Tracer, Work},
+    scene::{Hit, Scene, Tracer, Work},
 };
 
 /// What the samples of colours tell.
@@ -28,7 +24,8 @@ pub fn gather(scene: &Scene, lattice: Lattice, samples: SampleRange, beside: &Be
     if scene.aovs.is_empty() {
         return Ok(Vec::new());
     }
-    scene.run(Gathering { lattice, samples, beside, cancel, seen: Seen::default() })
+    let (wave, hits, seen, told) = (Wave::default(), Vec::new(), Seen::default(), Told::default());
+    scene.run(Gathering { lattice, samples, beside, cancel, wave, hits, seen, told })
 }
 
 struct Gathering<'c> {
@@ -36,7 +33,18 @@ struct Gathering<'c> {
     samples: SampleRange,
     beside: &'c Beside,
     cancel: &'c AtomicBool,
+    wave: Wave,
+    hits: Vec<Option<Hit>>,
+    /// By the pixel that is being looked at.
     seen: Seen,
+    told: Told,
+}
+
+/// What was told of the pixels that are done.
+#[derive(Default)]
+struct Told {
+    pixels: usize,
+    numbers: Vec<f32>,
 }
 
 impl Work for Gathering<'_> {
@@ -44,36 +52,55 @@ impl Work for Gathering<'_> {
 
     #[inline(always)]
     fn run(mut self, scene: impl Tracer) -> Self::Output {
-        let aovs = scene.aovs;
-        let of_hits = aovs.iter().any(|aov| !matches!(aov, Aov::Samples | Aov::Error | Aov::Residual));
-        let (mut errors, mut residuals) = (self.beside.errors.iter(), self.beside.residuals.iter());
-        let mut numbers = Vec::new();
+        let of_hits = scene.aovs.iter().any(|aov| !matches!(aov, Aov::Samples | Aov::Error | Aov::Residual));
         for y in self.lattice.rows() {
             if self.cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
             for x in self.lattice.columns() {
-                if of_hits {
-                    self.look(scene, (x, y));
+                if !of_hits {
+                    self.tell(&scene);
+                    continue;
                 }
-                let of_color = (errors.next().copied().unwrap_or_default(), residuals.next().copied().unwrap_or_default());
-                self.seen.tell(aovs, self.samples.count, of_color, scene.begin(), &mut numbers);
+                for index in self.samples.first..self.samples.first + self.samples.count {
+                    self.wave.push(&scene, (x, y), index);
+                    if self.wave.is_full() {
+                        self.look(scene);
+                    }
+                }
             }
         }
-        Ok(numbers)
+        self.look(scene);
+        Ok(self.told.numbers)
     }
 }
 
 impl Gathering<'_> {
-    /// Looks at a pixel along the rays of its samples.
+    /// Looks along the rays of a wave, and tells of the pixels that are done.
     #[inline(always)]
-    fn look(&mut self, scene: impl Tracer, pixel: (u32, u32)) {
-        self.seen.clear();
-        for index in self.samples.first..self.samples.first + self.samples.count {
-            let sampler = Sampler::new(scene.seed, pixel, index);
-            let (ray, weight) = camera_ray(&scene, pixel, &sampler);
-            self.seen.add(first(scene, &ray), weight, index == self.samples.first);
+    fn look(&mut self, scene: impl Tracer) {
+        self.hits.clear();
+        scene.hits_from_eye(&self.wave.rays, |_, hit| self.hits.push(hit));
+        for number in 0..self.hits.len() {
+            scene.prefetch(&self.hits, number);
+            let (ray, weight) = (&self.wave.rays[number], self.wave.weights[number]);
+            let met = self.hits[number].and_then(|hit| scene.surface(ray, &hit));
+            self.seen.add(met.and_then(|met| first(scene, ray, met)), weight);
+            if self.seen.samples == self.samples.count {
+                self.tell(&scene);
+                self.seen.clear();
+            }
         }
+        self.wave.clear();
+    }
+
+    /// Tells of the next pixel.
+    fn tell(&mut self, scene: &Scene) {
+        let Told { pixels, numbers } = &mut self.told;
+        let error = self.beside.errors.get(*pixels).copied().unwrap_or_default();
+        let residual = self.beside.residuals.get(*pixels).copied().unwrap_or_default();
+        self.seen.tell(scene.aovs, self.samples.count, (error, residual), scene.begin(), numbers);
+        *pixels += 1;
     }
 }
 
@@ -97,10 +124,10 @@ impl Seen {
         (self.samples, self.met, self.first) = (0, 0, [0; 2]);
     }
 
-    fn add(&mut self, met: Option<First>, weight: f64, is_first: bool) {
+    fn add(&mut self, met: Option<First>, weight: f64) {
         self.samples += 1;
         self.met += u64::from(met.is_some());
-        if let (true, Some(met)) = (is_first, &met) {
+        if let (1, Some(met)) = (self.samples, &met) {
             self.first = [met.object + 1, met.material + 1];
         }
         let of = |what: fn(&First) -> DVec3| met.as_ref().map_or(DVec3::ZERO, what);

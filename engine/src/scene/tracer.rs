@@ -26,9 +26,6 @@ pub trait Tracer: Copy + Deref<Target = Scene> {
     /// See [`Scene::closest`].
     fn closest(self, ray: &Ray) -> Option<Surface>;
 
-    /// The same for a ray that starts at the camera's eye.
-    fn closest_from_eye(self, ray: &Ray) -> Option<Surface>;
-
     /// See [`Scene::any`].
     fn any(self, ray: &Ray, blocks: impl FnMut(u32, &Crossing) -> bool) -> bool;
 
@@ -131,13 +128,6 @@ impl<L: Outlined> Tracer for View<'_, L> {
     fn closest(self, ray: &Ray) -> Option<Surface> {
         // SAFETY: see above.
         let hit = unsafe { L::closest(self.scene, ray, None) };
-        self.scene.surface(ray, &hit)
-    }
-
-    #[inline(always)]
-    fn closest_from_eye(self, ray: &Ray) -> Option<Surface> {
-        // SAFETY: see above.
-        let hit = unsafe { L::closest(self.scene, ray, self.scene.geometry.from_eye.as_ref()) };
         self.scene.surface(ray, &hit)
     }
 

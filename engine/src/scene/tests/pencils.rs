@@ -19,7 +19,8 @@ impl Work for Compare {
         let [mut hits, mut blocked, mut free] = [0; 3];
         for target in self.0 {
             let ray = Ray::new(scene.camera.eye(), (target - scene.camera.eye()).normalize());
-            let met = scene.closest_from_eye(&ray);
+            let mut met = None;
+            scene.hits_from_eye(&[ray], |_, hit| met = hit.and_then(|hit| scene.surface(&ray, &hit)));
             assert_eq!(met, scene.closest(&ray), "{ray:?}");
             let Some(surface) = met else { continue };
             hits += 1;
