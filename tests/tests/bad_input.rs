@@ -103,6 +103,22 @@ fn a_warning_is_said_once() {
 }
 
 #[test]
+fn a_black_picture_is_told() {
+    let program = Program::new(BINARY);
+    let lit = job(&sphere("tessera.diffuse {}"), "");
+    for (name, script, is_black) in [("lit", lit.clone(), false), ("dark", lit.replace("intensity = 30", "intensity = 0"), true)] {
+        fs::write(program.path("job.lua"), script).unwrap();
+        for how in [["--nodes", "1"], ["--threads", "1"]] {
+            let finished = program.run(&["render", "job.lua", how[0], how[1], "-o", "out"]);
+            assert_eq!(finished.code, Some(0), "{name}: {}", finished.errors);
+            let said = format!("{}{}", finished.lines.join("\n"), finished.errors);
+            assert_eq!(said.matches("every pixel is black").count(), usize::from(is_black), "{name} {how:?}: {said}");
+        }
+        assert_eq!(manifest(&program.path("out/job.manifest.json"))["image"]["is_black"] == true, is_black);
+    }
+}
+
+#[test]
 fn a_number_that_is_none_and_a_coordinator_that_is_not_there_are_named() {
     let program = Program::new(BINARY);
     program.make_keys("keys", &[]);

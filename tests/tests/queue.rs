@@ -45,6 +45,20 @@ fn every_frame_of_a_sequence_is_that_of_a_job_of_its_own() {
     assert!(!program.path("farm/walk.0003.exr").exists());
 }
 
+/// The script fails for the last frame: those before it are pictures all the same, with a farm and without one.
+#[test]
+fn a_frame_that_fails_takes_none_before_it_along() {
+    let program = program();
+    fs::write(program.path("walk.lua"), SEQUENCE.replace("radius = 1", "radius = 5 - frame")).unwrap();
+    for (folder, how) in [("farm", ["--nodes", "1"]), ("process", ["--threads", "1"])] {
+        let finished = program.run(&["render", "walk.lua", how[0], how[1], "-o", folder]);
+        assert_eq!(finished.code, Some(3), "{}", finished.errors);
+        assert!(finished.errors.contains("frame 6: walk.lua:5: sphere: `radius`"), "{}", finished.errors);
+        let pictures = [2, 4, 6].map(|frame| program.path(folder).join(format!("walk.{frame:04}.exr")).exists());
+        assert_eq!(pictures, [true, true, false], "{folder}");
+    }
+}
+
 /// A farm with one node, and clients of two roles.
 struct Farm {
     program: Program,

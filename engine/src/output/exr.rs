@@ -77,6 +77,8 @@ pub struct Written {
     pub hash: [u8; 32],
     /// Numbers of colours that were too large for a half float and were clamped.
     pub clamped: u64,
+    /// Whether all colours are 0.
+    pub is_black: bool,
 }
 
 /// Writes a picture, of which it holds a few rows at a time; equal pictures and identities give equal bytes.
@@ -91,7 +93,7 @@ pub fn write(path: &Path, mut picture: impl Rows, pixel_type: PixelType, identit
         let write = |_, writer: &mut _| chunks.write(writer, &mut picture);
         block::write(file, [header?].into_iter().collect(), true, write).map_err(io_error)
     })?;
-    Ok(Written { hash: *chunks.hasher.finalize().as_bytes(), clamped: chunks.clamped })
+    Ok(Written { hash: *chunks.hasher.finalize().as_bytes(), clamped: chunks.clamped, is_black: chunks.is_black })
 }
 
 /// Rows of one chunk of the compression ZIP16.
@@ -142,6 +144,7 @@ struct Chunks {
     compressor: Compressor,
     hasher: blake3::Hasher,
     clamped: u64,
+    is_black: bool,
     /// Of one channel of one row.
     numbers: Vec<f32>,
     halves: Vec<f16>,
@@ -152,7 +155,8 @@ struct Chunks {
 impl Chunks {
     fn new(channels: Vec<(&'static str, Place)>, pixel_type: PixelType) -> Self {
         let (numbers, halves, bytes) = (Vec::new(), Vec::new(), Vec::new());
-        Self { channels, pixel_type, compressor: Compressor::new(), hasher: blake3::Hasher::new(), clamped: 0, numbers, halves, bytes }
+        let (compressor, hasher) = (Compressor::new(), blake3::Hasher::new());
+        Self { channels, pixel_type, compressor, hasher, clamped: 0, is_black: true, numbers, halves, bytes }
     }
 
     fn write(&mut self, writer: &mut impl ChunksWriter, picture: &mut impl Rows) -> Result<(), Error> {
@@ -193,6 +197,7 @@ impl Chunks {
                 _ => append(&mut self.bytes, &self.numbers, f32::to_le_bytes),
             }
         }
+        self.is_black &= row.iter().all(|pixel| *pixel == [0.0; 3]);
         film::hash_row(&mut self.hasher, row.as_flattened());
         film::hash_row(&mut self.hasher, extra);
     }

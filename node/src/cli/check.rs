@@ -119,7 +119,7 @@ impl Summary {
             ("scene", self.scene.text()),
             ("render", self.render.clone()),
             ("probe", self.probe.clone()),
-            ("split", format!("{}: {} parts", self.split, self.parts)),
+            ("split", format!("{}: {} part{}", self.split, self.parts, if self.parts == 1 { "" } else { "s" })),
             ("assign", self.assign.clone()),
             ("output", self.outputs.join(", ")),
             ("image_hash", self.image_hash.clone()),
@@ -182,7 +182,8 @@ impl Contents {
         let words: Vec<String> = (counts.iter().filter(|(count, ..)| *count > 0))
             .map(|(count, one, many)| format!("{count} {}", if *count == 1 { one } else { many }))
             .collect();
-        format!("{}; {:.1} MiB", words.join(", "), self.memory_bytes as f64 / f64::from(1 << 20))
+        let what = if words.is_empty() { "nothing".to_owned() } else { words.join(", ") };
+        format!("{what}; {:.1} MiB", self.memory_bytes as f64 / f64::from(1 << 20))
     }
 }
 

@@ -8,12 +8,13 @@ use tessera_engine::{
     scene::Unbuilt,
 };
 
-use super::{here, render::check_samples};
+use super::{here, progress::Show, render::check_samples};
 use crate::{
     coordinator::{identity, write_pictures},
     error::{Error, ExitCode, Result},
     job::{JobDescription, Policies},
     limits::POLICY_TIMEOUT,
+    manifest,
     schedule::{CostMap, NodeId, NodePower, Split, split},
 };
 
@@ -21,7 +22,7 @@ use crate::{
 ///
 /// # Errors
 /// When the job's own split fails, or the folder refuses the files; or, when they stand, if too many samples are invalid.
-pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder: &Path) -> Result<Vec<PathBuf>> {
+pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder: &Path, show: Show) -> Result<Vec<PathBuf>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads as usize).build();
     let scene = pool.map_err(|error| Error::new(ExitCode::Internal, error.to_string()))?.install(|| part::prepared(scene.build()));
     let parts = parts(description, threads)?;
@@ -29,7 +30,8 @@ pub fn render(description: &JobDescription, scene: Unbuilt, threads: u32, folder
     let samples = SampleRange { first, count: samples.into() };
     let (film, counters) = here::parts(&scene, &parts, samples, threads as usize, |_| ())?;
     let identity = identity(description).map_err(|error| Error::new(ExitCode::Internal, error))?;
-    write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    let image = write_pictures(description, &identity, &film, &[], folder).map_err(|error| Error::new(ExitCode::File, error))?;
+    manifest::blackness(&image).into_iter().for_each(|warning| show.progress().say(&format!("warning: {warning}")));
     check_samples(counters.invalid_samples, counters.camera_rays)?;
     Ok([Some(&description.output.exr), description.output.png.as_ref()].into_iter().flatten().map(|name| folder.join(name)).collect())
 }

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     coordinator::{identity, write_pictures},
     error::{Error, ExitCode, Result},
-    job::{JobDescription, LoadedJob, PixelType},
+    job::{JobDescription, LoadedJob, PixelType, not_extended},
     manifest::{self, ImageEntry, Manifest},
     wire::Terms,
 };
@@ -87,8 +87,8 @@ impl<'a> Extension<'a> {
             }
             () => {}
         }
-        if let Some(aov) = frame.aovs.iter().find(|aov| !aov.can_be_extended()) {
-            return Err(refused(&format!("what \"{}\" tells", aov.name())).with_help("leave it out, and render it by a job of its own"));
+        if let Some(fixed) = not_extended(frame.aovs) {
+            return Err(refused(&format!("what {fixed} tells")).with_help("leave that out, and render it by a job of its own"));
         }
         let exr::Picture { film, identity: found } = exr::read(&path).map_err(|error| {
             Error::new(ExitCode::File, error.to_string()).with_help("--extend adds to a picture that an earlier run left in this folder")

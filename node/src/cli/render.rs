@@ -78,7 +78,7 @@ pub fn run(args: Args) -> Result<()> {
             block_on(on_farm(address, &args, loaded))
         }
         (_, Some(threads)) => each_frame(&args.script, args.script.load()?, |loaded, scene| {
-            show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output)?)
+            show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output, args.show)?)
         }),
         (None, None) => {
             let folder = local::folder()?;
@@ -146,9 +146,10 @@ async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_
         description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
         progress.submitted(submitted.job.0);
     };
-    let jobs = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), taken).await?;
+    let (jobs, submitted) = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), taken).await;
     tokio::select! {
-        done = sequence::follow(client, &jobs, args.show, &args.output) => done,
+        // The frames before one that fails are pictures all the same.
+        done = sequence::follow(client, &jobs, args.show, &args.output) => submitted.and(done),
         () = interrupted(), if go_on => {
             let numbers: Vec<String> = jobs.iter().map(|job| job.job.0.to_string()).collect();
             let help = format!("the farm goes on with it; `tessera cancel {}` ends that", numbers.join(" "));

@@ -48,20 +48,32 @@ pub struct Submitted {
 
 /// Submits a job, or one for each frame of its sequence: the farm renders the first while later ones are made. `taken` is told of each.
 ///
-/// # Errors
-/// When the script fails for a frame, or the coordinator refuses one; the frames before it are submitted then.
+/// Also returns the error that ended it before the last frame: the script's, or that the coordinator refuses a job. The frames before it are submitted then.
 pub async fn submit(
     client: &Client,
     script: &Script,
     first: LoadedJob,
-    mut terms: Terms,
+    terms: Terms,
     mut taken: impl FnMut(&Submitted, &JobDescription),
-) -> Result<Vec<Submitted>> {
-    let (mut all, sequence, before) = (Vec::new(), first.sequence(&script.parameters()), terms.after.clone());
+) -> (Vec<Submitted>, Result<()>) {
+    let mut all = Vec::new();
+    let done = submit_each(client, script, first, terms, &mut all, &mut taken).await;
+    (all, done)
+}
+
+async fn submit_each(
+    client: &Client,
+    script: &Script,
+    first: LoadedJob,
+    mut terms: Terms,
+    all: &mut Vec<Submitted>,
+    taken: &mut impl FnMut(&Submitted, &JobDescription),
+) -> Result<()> {
+    let (sequence, before) = (first.sequence(&script.parameters()), terms.after.clone());
     let mut rest = sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1);
     let mut next = Some(first);
     while let Some(loaded) = next.take() {
-        let job = client.submit(&loaded.description, &loaded.assets, &terms).await.map_err(|error| told(error, &all))?;
+        let job = client.submit(&loaded.description, &loaded.assets, &terms).await?;
         let LoadedJob { description, frames, .. } = loaded;
         let frame = frames.map(|(frame, _)| frame).filter(|_| sequence.is_some());
         let submitted = Submitted { job, frame, manifest: description.output.manifest.clone(), warnings: description.warnings.clone() };
@@ -71,15 +83,18 @@ pub async fn submit(
             terms.after = before.iter().copied().chain([job]).collect();
         }
         if let Some(frame) = rest.next() {
-            let loaded = script.load_frame(frame).map_err(|error| Error { message: format!("frame {frame}: {}", error.message), ..error });
-            next = Some(loaded.map_err(|error| told(error, &all))?.0);
+            next = Some(load_frame(script, frame)?.0);
         }
     }
-    Ok(all)
+    Ok(())
 }
 
-/// An error in the middle of a sequence: what is submitted already goes on.
-fn told(error: Error, before: &[Submitted]) -> Error {
+fn load_frame(script: &Script, frame: u32) -> Result<(LoadedJob, Unbuilt)> {
+    script.load_frame(frame).map_err(|error| Error { message: format!("frame {frame}: {}", error.message), ..error })
+}
+
+/// An error in the middle of a sequence of which nobody waits for what is submitted already.
+pub fn going_on(error: Error, before: &[Submitted]) -> Error {
     match before {
         [first, ..] if error.help.is_none() => {
             let last = before.last().map_or(first.job.0, |last| last.job.0);
@@ -89,7 +104,7 @@ fn told(error: Error, before: &[Submitted]) -> Error {
     }
 }
 
-/// Follows jobs to their ends, one after the other, and puts their files into a folder. .
+/// Follows jobs to their ends, one after the other, and puts their files into a folder.
 ///
 /// # Errors
 /// The first that there is; other frames are fetched all the same.
@@ -150,7 +165,7 @@ pub fn each_frame(script: &Script, first: (LoadedJob, Unbuilt), mut render: impl
     let sequence = first.0.sequence(&script.parameters());
     render(&first.0, first.1)?;
     for frame in sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1) {
-        let (loaded, scene) = script.load_frame(frame)?;
+        let (loaded, scene) = load_frame(script, frame)?;
         render(&loaded, scene)?;
     }
     Ok(())

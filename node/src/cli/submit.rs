@@ -53,8 +53,11 @@ pub fn run(args: Args) -> Result<()> {
                 println!("{}", submitted.job.0);
             }
         };
-        let jobs = sequence::submit(&client, &args.script, loaded, args.standing.terms(args.min_nodes), taken).await?;
-        let done = if args.wait { sequence::follow(&client, &jobs, args.show, &args.output).await } else { Ok(()) };
+        let (jobs, submitted) = sequence::submit(&client, &args.script, loaded, args.standing.terms(args.min_nodes), taken).await;
+        let done = match args.wait {
+            true => submitted.and(sequence::follow(&client, &jobs, args.show, &args.output).await),
+            false => submitted.map_err(|error| sequence::going_on(error, &jobs)),
+        };
         client.close().await;
         done
     })

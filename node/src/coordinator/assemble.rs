@@ -109,7 +109,7 @@ pub fn write_pictures(
     let path = folder.join(&output.exr);
     let holes: Vec<[u32; 4]> = holes.iter().map(|hole| [hole.x, hole.y, hole.width, hole.height]).collect();
     let identity = exr::Identity { holes: holes.clone(), ..identity.clone() };
-    let exr::Written { hash: pixels_hash, clamped } =
+    let exr::Written { hash: pixels_hash, clamped, is_black } =
         exr::write(&path, &mut picture, written, &identity).map_err(|error| error.to_string())?;
     let (width, height) = picture.size();
     if let Some(name) = &output.png {
@@ -128,6 +128,7 @@ pub fn write_pictures(
         aovs: picture.aovs().iter().map(|aov| aov.name().to_owned()).collect(),
         pixels_hash: blake3::Hash::from_bytes(pixels_hash).to_string(),
         clamped,
+        is_black,
         invalid_samples: 0,
         holes,
     })

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use tessera_engine::description::{AssetId, Frame};
+use tessera_engine::description::{Aovs, AssetId, Frame};
 
 use crate::schedule::{Assign, Probe, Split};
 
@@ -98,4 +98,10 @@ pub struct ScriptBundle {
     pub source: String,
     /// Module name to (file name for messages, source).
     pub modules: BTreeMap<String, (String, String)>,
+}
+
+/// What keeps a picture that tells it from being extended to more samples, in words, if anything does.
+pub fn not_extended(aovs: Aovs) -> Option<String> {
+    let fixed: Vec<_> = aovs.iter().filter(|aov| !aov.can_be_extended()).map(|aov| format!("\"{}\"", aov.name())).collect();
+    (!fixed.is_empty()).then(|| fixed.join(", "))
 }

@@ -38,6 +38,14 @@ impl Fault {
         if self.names_a_line() { self } else { Self { message: format!("{place}: {}", self.message), ..self } }
     }
 
+    /// With the way out of the machine's own error that is met most.
+    fn with_hint(self) -> Self {
+        if self.help.is_some() || !self.message.contains("attempt to index nil with") {
+            return self;
+        }
+        self.with_help("what stands before that name is nothing: is it misspelt, or `local tessera = require(\"tessera\")` missing?")
+    }
+
     fn from_text(text: &str) -> Self {
         match text.split_once(HELP) {
             Some((message, help)) => Self::new(message).with_help(help),
@@ -78,7 +86,7 @@ impl From<&mlua::Error> for Fault {
                 None => Self::new(cause.to_string()),
             },
             E::SyntaxError { message, .. } => Self::new(syntax(message)),
-            E::RuntimeError(text) | E::MemoryError(text) => Self::from_text(without_trace(text)),
+            E::RuntimeError(text) | E::MemoryError(text) => Self::from_text(without_trace(text)).with_hint(),
             E::StackError => Self::new("stack overflow"),
             other => Self::new(other.to_string()),
         }

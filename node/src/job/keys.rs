@@ -71,14 +71,22 @@ impl<'a> Keys<'a> {
             Value::String(name) if self.known.iter().any(|known| known.as_bytes() == &*name.as_bytes()) => Ok(()),
             Value::String(name) => {
                 let name = name.to_string_lossy();
-                let help = nearest(&name, self.known.iter().copied())
-                    .map_or_else(|| usage("it", self.known), |near| format!("did you mean `{near}`?"));
+                let help = nearest(&name, self.known.iter().copied()).map_or_else(
+                    || self.elsewhere(&name).unwrap_or_else(|| usage("it", self.known)),
+                    |near| format!("did you mean `{near}`?"),
+                );
                 Err(self.fault(format!("unknown key `{}`", shorten(&name))).with_help(help).into())
             }
             Value::Integer(_) | Value::Number(_) if items => Ok(()),
             Value::Integer(_) | Value::Number(_) => Err(self.fault("a value without a key").with_help(usage("it", self.known)).into()),
             other => Err(self.fault(format!("{} cannot be a key", describe(self.lua, other))).into()),
         })
+    }
+
+    /// Where something is said that other programs call so.
+    fn elsewhere(&self, name: &str) -> Option<String> {
+        let (_, key, example) = ELSEWHERE.iter().find(|(other, key, _)| *other == name && self.known.contains(key))?;
+        Some(format!("say it by `{key}`: {example}"))
     }
 
     /// A fault of this call.
@@ -109,7 +117,7 @@ impl<'a> Keys<'a> {
     /// The list part of the table.
     pub fn items(&self) -> mlua::Result<Vec<Field<'_, 'a>>> {
         match &self.given {
-            Given::Table(table) => items(self, "", table),
+            Given::Table(table) => items(self, "", table, true),
             Given::List(_) => Ok(Vec::new()),
         }
     }
@@ -311,7 +319,7 @@ impl<'a> Field<'_, 'a> {
     /// The values of a list, lists within it in their place.
     pub fn list(&self) -> mlua::Result<Vec<Self>> {
         let Value::Table(table) = &self.value else { return Err(self.wrong("a list").into()) };
-        items(self.keys, &self.name, table)
+        items(self.keys, &self.name, table, false)
     }
 
     pub fn function(&self) -> Option<&Function> {
@@ -331,6 +339,25 @@ impl<'a> Field<'_, 'a> {
         })
     }
 }
+
+/// What other programs have words for, the key that says it here, and how.
+const ELSEWHERE: &[(&str, &str, &str)] = &[
+    ("samples", "quality", "quality = { samples = 16 }"),
+    ("spp", "quality", "quality = { samples = 16 }"),
+    ("width", "film", "film = { width = 640, height = 480 }"),
+    ("height", "film", "film = { width = 640, height = 480 }"),
+    ("resolution", "film", "film = { width = 640, height = 480 }"),
+    ("integrator", "render", "render = tessera.path {}"),
+    ("objects", "scene", "scene = tessera.scene { objects = { ... } }"),
+    ("lights", "scene", "scene = tessera.scene { objects = { ... }, lights = { ... } }"),
+    ("aovs", "output", "output = { aovs = { \"albedo\" } }"),
+    ("color", "reflectance", "reflectance = { 0.8, 0.5, 0.2 }"),
+    ("colour", "reflectance", "reflectance = { 0.8, 0.5, 0.2 }"),
+    ("albedo", "reflectance", "reflectance = { 0.8, 0.5, 0.2 }"),
+    ("color", "radiance", "radiance = { 5, 4, 3 }"),
+    ("strength", "radiance", "radiance = { 5, 4, 3 }"),
+    ("power", "intensity", "intensity = { 5, 4, 3 }"),
+];
 
 fn quoted<T>(choices: &[(&str, T)]) -> String {
     choices.iter().map(|(word, _)| format!("\"{word}\"")).collect::<Vec<_>>().join(" or ")
@@ -357,8 +384,9 @@ fn has_keys(table: &Table) -> mlua::Result<bool> {
     Ok(pairs != length)
 }
 
-fn items<'k, 'a>(keys: &'k Keys<'a>, name: &str, table: &Table) -> mlua::Result<Vec<Field<'k, 'a>>> {
+fn items<'k, 'a>(keys: &'k Keys<'a>, name: &str, table: &Table, beside_keys: bool) -> mlua::Result<Vec<Field<'k, 'a>>> {
     let mut fields = Vec::new();
+    check_list(keys, name, table, beside_keys)?;
     gather(keys, name, table, NESTED_LISTS, &mut fields)?;
     Ok(fields)
 }
@@ -368,11 +396,37 @@ fn gather<'k, 'a>(keys: &'k Keys<'a>, name: &str, table: &Table, depth: usize, f
         let name = format!("{name}[{index}]");
         match table.raw_get::<Value>(index)? {
             Value::Table(_) if depth == 0 => return Err(keys.fault(format!("`{name}`: lists within lists go too deep")).into()),
-            Value::Table(inner) => gather(keys, &name, &inner, depth - 1, fields)?,
+            Value::Table(inner) => {
+                check_list(keys, &name, &inner, false)?;
+                gather(keys, &name, &inner, depth - 1, fields)?;
+            }
             value => fields.push(Field { keys, name, value }),
         }
     }
     Ok(())
+}
+
+/// Refuses what a list would lose: what stands under a name (where names were not checked before), below 1, or beyond a gap.
+fn check_list(keys: &Keys, name: &str, table: &Table, beside_keys: bool) -> mlua::Result<()> {
+    let length = table.raw_len();
+    let whose = if name.is_empty() { "the list".to_owned() } else { format!("`{name}`") };
+    table.for_each(|key: Value, _: Value| {
+        let number = match &key {
+            Value::Integer(number) => *number as f64,
+            Value::Number(number) => *number,
+            Value::String(_) if beside_keys => return Ok(()),
+            other => {
+                let fault = keys.fault(format!("{whose} must be a list, but has a value with the key {}", describe(keys.lua, other)));
+                return Err(fault.with_help("leave the key out: `{ a, b }`; what is in it may have a `name` of its own").into());
+            }
+        };
+        if (1.0..=length as f64).contains(&number) && number.fract() == 0.0 {
+            return Ok(());
+        }
+        let end = if length == 0 { "has none at 1".to_owned() } else { format!("ends at {length}") };
+        let fault = keys.fault(format!("{whose} has a value at {number}, but {end}"));
+        Err(fault.with_help("lists count from 1 and have no gaps: table.insert keeps them whole").into())
+    })
 }
 
 /// A value in words.

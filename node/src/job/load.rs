@@ -6,7 +6,7 @@ use std::{
 };
 
 use tessera_engine::{
-    description::{AssetId, AssetSource, MemoryAssets, Sources},
+    description::{Aov, AssetId, AssetSource, MemoryAssets, Sources},
     scene::Unbuilt,
 };
 
@@ -14,6 +14,7 @@ use super::{
     FRAME_PARAMETER, Frames, JobDescription, ScriptBundle, assemble,
     compile::{self, Compiled},
     context::{Context, Files, read_bounded},
+    description::not_extended,
     evaluate::{self, Evaluated, evaluate},
     fault::Fault,
     handle::Policy,
@@ -73,7 +74,13 @@ fn describe(
     let context = sandbox.lua().remove_app_data::<Context>().ok_or_else(|| Fault::new(format!("{name}: its context is gone")))?;
     let (scene, needed) = assemble::scene(&job.scene).map_err(|error| Fault::new(format!("{name}: {error}")))?;
     let assets = only(&context.assets, &needed);
-    let Compiled { frame, scene, warnings } = compile::compile(&name, scene, &job, &assets, &context.sources)?;
+    let Compiled { frame, scene, mut warnings } = compile::compile(&name, scene, &job, &assets, &context.sources)?;
+    if frame.aovs.contains(Aov::Residual) {
+        warnings.extend(
+            not_extended(frame.aovs)
+                .map(|what| format!("{name}: a picture that tells {what} cannot be extended, though it tells its \"residual\"")),
+        );
+    }
     let (split, assign) = (built_in(&job.split, Split::Script), built_in(&job.assign, Assign::Script));
     let asks_script = matches!(job.split, Policy::Script(_)) || matches!(job.assign, Policy::Script(_));
     let description = JobDescription {

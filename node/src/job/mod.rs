@@ -20,7 +20,7 @@ mod policy;
 mod sandbox;
 
 pub use api::FRAME_PARAMETER;
-pub use description::{Frames, JobDescription, Output, PixelType, ScriptBundle};
+pub use description::{Frames, JobDescription, Output, PixelType, ScriptBundle, not_extended};
 pub use load::{LoadedJob, load};
 pub use policy::Policies;
 #[doc(hidden)]

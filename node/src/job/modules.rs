@@ -139,5 +139,8 @@ fn check_name(module: &str) -> Result<(), String> {
 /// A path as the user would write it: relative to the working directory where it lies below.
 pub fn shown(path: &Path) -> String {
     let here = std::env::current_dir().and_then(|here| here.canonicalize()).unwrap_or_default();
-    path.strip_prefix(&here).unwrap_or(path).display().to_string()
+    match path.strip_prefix(&here) {
+        Ok(rest) if !rest.as_os_str().is_empty() && here.parent().is_some() => rest.display().to_string(),
+        _ => path.display().to_string(),
+    }
 }

@@ -49,6 +49,7 @@ pub fn build(submission: Submission, image: ImageEntry, record: JobRecord, total
     let mut warnings = submission.warnings;
     warnings.extend(record.warnings);
     warnings.extend(invalid_samples(&image));
+    warnings.extend(blackness(&image).map(str::to_owned));
     let mut manifest = Manifest {
         version: VERSION,
         program: program(),
@@ -82,6 +83,12 @@ pub fn build(submission: Submission, image: ImageEntry, record: JobRecord, total
 /// Version and engine revision of this program, as they stand in manifests.
 pub fn program() -> String {
     format!("tessera {} (engine revision {})", env!("CARGO_PKG_VERSION"), tessera_engine::REVISION)
+}
+
+/// What is to be said of a picture in which nothing is to be seen, though nothing failed.
+pub fn blackness(image: &ImageEntry) -> Option<&'static str> {
+    let is_odd = image.is_black && image.holes.is_empty() && image.invalid_samples == 0;
+    is_odd.then_some("every pixel is black: look whether light gets to what the camera sees, and whether the camera is inside of something or looks past it")
 }
 
 fn invalid_samples(image: &ImageEntry) -> Option<String> {

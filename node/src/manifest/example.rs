@@ -105,6 +105,7 @@ impl Example {
             pixel_type: PixelType::Float,
             aovs: Vec::new(),
             pixels_hash: "22".repeat(32),
+            is_black: false,
             clamped: 0,
             invalid_samples: 0,
             holes: Vec::new(),

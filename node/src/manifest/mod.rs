@@ -9,7 +9,7 @@ mod file;
 mod time;
 mod types;
 
-pub use build::{JobRecord, Submission, build, program};
+pub use build::{JobRecord, Submission, blackness, build, program};
 pub use evaluate::{NodeFigures, evaluate, figures, overbalance};
 pub use file::{parse, read, schema, to_json, write};
 pub use time::rfc3339;

@@ -1,6 +1,6 @@
 //! What stands in a manifest. Times are seconds on the job's own time line, 0 at its submission.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, ops::Not};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -94,6 +94,9 @@ pub struct ImageEntry {
     pub holes: Vec<[u32; 4]>,
     /// Values that half floats could not hold and that were clamped, where the EXR holds half floats.
     pub clamped: u64,
+    /// Whether every pixel is black; left out where not.
+    #[serde(default, skip_serializing_if = "Not::not")]
+    pub is_black: bool,
     /// Samples with a component that was negative or no finite number: they count as black.
     #[serde(default)]
     pub invalid_samples: u64,

@@ -25,7 +25,8 @@ fn headline(manifest: &Manifest, style: Style) -> String {
     let image = &manifest.image;
     let samples = if image.samples == 1 { "1 sample".to_owned() } else { format!("{} samples", image.samples) };
     let what = format!("{} x {}, {samples} a pixel", image.width, image.height);
-    let how = format!("{} parts ({}), {}", manifest.parts.len(), manifest.job.split, manifest.job.assign);
+    let parts = if manifest.parts.len() == 1 { "1 part".to_owned() } else { format!("{} parts", manifest.parts.len()) };
+    let how = format!("{parts} ({}), {}", manifest.job.split, manifest.job.assign);
     format!("{}  {what}; {how}; {}", style.bold(&manifest.job.name), manifest.job.outcome)
 }
 
@@ -88,7 +89,7 @@ fn losses(manifest: &Manifest, style: Style) -> Vec<String> {
         .fold(0.0, |sum, seconds| sum + seconds); // an empty `sum` of floats is -0
     if !reassigned.is_empty() {
         let parts = if reassigned.len() == 1 { "1 part was".to_owned() } else { format!("{} parts were", reassigned.len()) };
-        lines.push(format!("{parts} given to other nodes; {} of finished work was not needed", seconds(wasted)));
+        lines.push(format!("{parts} given out once more; {} of finished work was not needed", seconds(wasted)));
     }
     lines
 }

@@ -170,7 +170,12 @@ fn output(job: &Keys, frames: Option<&(u32, Frames)>) -> mlua::Result<(Output, A
     let pixel_type = keys.or("pixel_type", PixelType::Float, |field| field.choice(&types))?;
     let exposure = keys.or("exposure", 0.0, |field| field.number(EXPOSURE))?;
     let words = Aov::ALL.map(|aov| (aov.name(), aov));
-    let aovs = keys.or("aovs", Aovs::NONE, |field| Ok(field.choices(&words)?.into_iter().collect()))?;
+    let aovs: Aovs = keys.or("aovs", Aovs::NONE, |field| Ok(field.choices(&words)?.into_iter().collect()))?;
+    if aovs.contains(Aov::Residual) && pixel_type == PixelType::Half {
+        let fault =
+            keys.fault("`pixel_type` \"half\" and the AOV \"residual\" do not go together: the residual is what floats of 32 bits lack");
+        return Err(fault.with_help("leave `pixel_type` out").into());
+    }
     Ok((Output { exr, png, manifest: defaults.manifest, pixel_type, exposure }.numbered(frames), aovs))
 }
 

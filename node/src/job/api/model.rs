@@ -39,7 +39,9 @@ pub fn asset(field: &Field, name: &str) -> mlua::Result<(Option<PathBuf>, AssetI
     }
     let fault = |what| {
         let fault = field.keys.fault(what);
-        fault.with_help("paths are relative to the folder of the Lua file that names them")
+        fault.with_help(
+            "paths are relative to the folder of the Lua file that names them; a project is what lies below the nearest folder above the script that holds .luaurc or .git",
+        )
     };
     let (path, bytes) = context.read(&field.keys.place.file, name).map_err(fault)?;
     let id = context.keep(bytes).map_err(|what| field.keys.fault(what))?;

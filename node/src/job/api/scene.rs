@@ -1,12 +1,13 @@
 //! Scenes.
 
-use std::sync::Arc;
+use std::{cell::Cell, sync::Arc};
 
 use mlua::Value;
 use tessera_engine::description::Environment;
 
 use super::{Form, Function, environment, group, medium};
 use crate::job::{
+    fault::Fault,
     handle::{SceneNode, Thing},
     keys::{Field, Keys},
 };
@@ -23,8 +24,12 @@ fn scene(keys: &Keys) -> mlua::Result<Value> {
 }
 
 fn light(field: &Field) -> mlua::Result<tessera_engine::description::Light> {
-    field.thing("a light (tessera.point, spot or directional)", |handle| match &handle.thing {
-        Thing::Light(light) => Some(light.clone()),
-        _ => None,
+    let is_shape = Cell::new(false);
+    let light = field.thing("a light (tessera.point, spot or directional)", |handle| {
+        is_shape.set(matches!(handle.thing, Thing::Object(_)));
+        if let Thing::Light(light) = &handle.thing { Some(light.clone()) } else { None }
+    });
+    light.map_err(|error| {
+        if is_shape.get() { Fault::from(&error).with_help("shapes stand in `objects`, also those that shine").into() } else { error }
     })
 }
