@@ -477,6 +477,8 @@ function tessera.noise(keys) end
 ---@field color_space? "srgb"|"linear" how its numbers are coded
 ---@field wrap? tessera.Wrap|tessera.Wrap[] what lies beyond its edges in u and v
 ---@field filter? "bilinear"|"trilinear" how it is interpolated
+---@field scale? number|number[] what u and v are multiplied by: 1
+---@field offset? number[] what is added to u and v then: { 0, 0 }
 ---@field name? string for messages
 
 ---A picture file: PNG, JPEG or Radiance HDR. Its first row lies at v = 0, as in glTF.

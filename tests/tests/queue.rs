@@ -53,7 +53,7 @@ fn a_frame_that_fails_takes_none_before_it_along() {
     for (folder, how) in [("farm", ["--nodes", "1"]), ("process", ["--threads", "1"])] {
         let finished = program.run(&["render", "walk.lua", how[0], how[1], "-o", folder]);
         assert_eq!(finished.code, Some(3), "{}", finished.errors);
-        assert!(finished.errors.contains("frame 6: walk.lua:5: sphere: `radius`"), "{}", finished.errors);
+        assert!(finished.errors.contains("frame 6: walk.lua:6: sphere: `radius`"), "{}", finished.errors);
         let pictures = [2, 4, 6].map(|frame| program.path(folder).join(format!("walk.{frame:04}.exr")).exists());
         assert_eq!(pictures, [true, true, false], "{folder}");
     }

@@ -53,6 +53,10 @@ pub enum Texture {
         wrap: [Wrap; 2],
         /// What is between its pixels, and where they are smaller than the film's.
         filter: TextureFilter,
+        /// What u and v are multiplied by before.
+        scale: [f64; 2],
+        /// What is added to them then.
+        offset: [f64; 2],
         /// Where the script made it.
         #[serde(skip)]
         source: SourceId,

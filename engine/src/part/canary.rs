@@ -64,6 +64,8 @@ pub fn canary(seed: u64) -> Result<(Frame, MemoryAssets), CanaryError> {
             color_space: ColorSpace::Srgb,
             wrap: [Wrap::Repeat, Wrap::Mirror],
             filter: TextureFilter::Bilinear,
+            scale: [1.0; 2],
+            offset: [0.0; 2],
             source: SourceId::default(),
         },
     ];
@@ -263,14 +265,14 @@ mod tests {
     #[test]
     fn the_hash_is_that_of_this_revision() {
         let pixels = hex(pixels(&compiled(1)).unwrap());
-        assert_eq!((crate::REVISION, pixels.as_str()), (6, "bb53a9fc2c50cb86b0ffece72f6a8519d49e916ded3b5fbff15b7cb2044dc7ad"));
+        assert_eq!((crate::REVISION, pixels.as_str()), (7, "bb53a9fc2c50cb86b0ffece72f6a8519d49e916ded3b5fbff15b7cb2044dc7ad"));
     }
 
     /// The same of paths.
     #[test]
     fn the_hash_of_paths_is_that_of_this_revision() {
         let pixels = hex(pixels(&lit(1)).unwrap());
-        assert_eq!((crate::REVISION, pixels.as_str()), (6, "7cdbe2a752e71ed6466324441e662f6a53078a727539bad7db16ece786d9bff8"));
+        assert_eq!((crate::REVISION, pixels.as_str()), (7, "7cdbe2a752e71ed6466324441e662f6a53078a727539bad7db16ece786d9bff8"));
     }
 
     /// Every kind of surface, light and medium is met, and nothing in it is no number.

@@ -93,6 +93,7 @@ pub struct PixelFilter(Kind);
 enum Kind {
     Box,
     Point,
+    Shaken,
     Table(Box<Axis>),
 }
 
@@ -118,6 +119,12 @@ impl PixelFilter {
         })
     }
 
+    /// One whose samples never look at the same place: what depends on a ray down to its last bit is then another for each. That of the pixel's centre looks up to 2^-21 of a pixel
+    /// beside it.
+    pub fn shaken(self) -> Self {
+        Self(if matches!(self.0, Kind::Point) { Kind::Shaken } else { self.0 })
+    }
+
     /// Where a sample looks, as an offset from the pixel's centre in pixels, and its weight: the mean of weight times g(offset) over all `u` of
     /// [0, 1)^2 is the filtered g, integral(f g) / integral(f). The weight is 1 for filters that are nowhere negative. In x and in y the
     /// offset grows with the number.
@@ -126,6 +133,7 @@ impl PixelFilter {
         match &self.0 {
             Kind::Box => (u - 0.5, 1.0),
             Kind::Point => (DVec2::ZERO, 1.0),
+            Kind::Shaken => ((u - 0.5) * SHAKE, 1.0),
             Kind::Table(axis) => {
                 let ((x, weight_x), (y, weight_y)) = (axis.sample(u.x), axis.sample(u.y));
                 (DVec2::new(x, y), weight_x * weight_y)
@@ -139,10 +147,14 @@ impl PixelFilter {
         match &self.0 {
             Kind::Box => 0.5,
             Kind::Point => 0.0,
+            Kind::Shaken => 0.5 * SHAKE,
             Kind::Table(axis) => axis.cell * CELLS as f64,
         }
     }
 }
+
+/// The side of the square in which samples look that should all look at its middle, in pixels.
+const SHAKE: f64 = 1.0 / (1u64 << 20) as f64;
 
 /// Cells of the half axis. The filter is linear within each: for a Gaussian of three standard deviations, off by 2e-5 of its peak.
 const CELLS: usize = 256;

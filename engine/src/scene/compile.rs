@@ -25,6 +25,9 @@ type Result<T> = std::result::Result<T, CompileError>;
 /// Rows of the picture of a clear sky.
 const SKY_ROWS: u32 = 256;
 
+/// Most pixels of an environment's image, 16384 x 8192: each takes 16 bytes.
+const ENVIRONMENT_PIXELS: u64 = 1 << 27;
+
 /// Most rows and columns of a film.
 const LARGEST_FILM: u32 = 65_536;
 
@@ -82,6 +85,8 @@ impl Scene {
             placed.warnings.push(Warning { source: SourceId::default(), message });
         }
         let light_sampler = LightSampler::new(emitters, &lights, &environment);
+        // Whether a surface that blends is there is decided by the ray.
+        let may_blend = matches!(frame.render, Render::Path { .. }) && placed.materials.iter().any(|material| material.blends);
         Ok(Unbuilt(Self {
             camera,
             lights,
@@ -91,7 +96,7 @@ impl Scene {
             media: false,
             around_eye: Inside::default(),
             light_sampler,
-            filter: PixelFilter::of(frame.film.filter),
+            filter: if may_blend { PixelFilter::of(frame.film.filter).shaken() } else { PixelFilter::of(frame.film.filter) },
             film: frame.film.clone(),
             render: frame.render.clone(),
             quality: frame.quality.clone(),
@@ -146,6 +151,11 @@ fn environment(environment: &description::Environment, assets: &dyn AssetSource)
             let bytes = assets.bytes(*file).ok_or_else(|| wrong(format!("the image's bytes ({file}) are not here")))?;
             let image = Image::decode(&bytes, description::ColorSpace::Srgb).map_err(|error| CompileError::asset(*source, error))?;
             let [width, height] = image.size();
+            if u64::from(width) * u64::from(height) > ENVIRONMENT_PIXELS {
+                return Err(wrong(format!(
+                    "the environment's image has {width} x {height} pixels; {ENVIRONMENT_PIXELS} are enough for any"
+                )));
+            }
             let scaled = |[r, g, b, _]: [f32; 4]| [r * scale[0], g * scale[1], b * scale[2]];
             let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| scaled(image.pixel(x, y))).collect();
             let turn = turned(*rotation);

@@ -73,6 +73,9 @@ pub enum Texture {
     },
 }
 
+/// The largest scale and offset of an image.
+const FARTHEST: f64 = 1e9;
+
 impl Texture {
     /// Decodes the texture's image, where it has one.
     ///
@@ -95,11 +98,17 @@ impl Texture {
                 }
                 Ok(Self::Noise { low: *low, high: *high, size: *size, octaves: *octaves, seed: *seed })
             }
-            description::Texture::Image { file, color_space, wrap, filter, .. } => {
+            description::Texture::Image { file, color_space, wrap, filter, scale, offset, .. } => {
+                // Products with coordinates stay finite, and so near to whole numbers that something is left between them.
+                if !scale.iter().chain(offset).all(|number| number.abs() <= FARTHEST) {
+                    return Err(AssetError::new(format!("the image's scale and offset must lie within -{FARTHEST:e} and {FARTHEST:e}")));
+                }
+                let is_moved = (*scale, *offset) != ([1.0; 2], [0.0; 2]);
+                let transform = is_moved.then(|| texture_transform((*scale).into(), 0.0, (*offset).into()));
                 let bytes = assets.bytes(*file).ok_or_else(|| AssetError::new(format!("the image's bytes ({file}) are not here")))?;
                 let image = Arc::new(Image::decode(&bytes, *color_space)?);
                 let pyramid = (*filter == TextureFilter::Trilinear).then(|| Arc::new(Pyramid::new(&image)));
-                Ok(Self::Image { image, pyramid, wrap: *wrap, coordinates: Coordinates::default() })
+                Ok(Self::Image { image, pyramid, wrap: *wrap, coordinates: Coordinates { transform, ..Coordinates::default() } })
             }
         }
     }

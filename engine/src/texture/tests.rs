@@ -16,7 +16,15 @@ fn png(image: impl Into<DynamicImage>) -> Vec<u8> {
 fn texture(file: &[u8], color_space: ColorSpace, wrap: [Wrap; 2]) -> Texture {
     let mut assets = MemoryAssets::default();
     let file = assets.insert(file.to_vec());
-    let image = description::Texture::Image { file, color_space, wrap, filter: TextureFilter::default(), source: SourceId::default() };
+    let image = description::Texture::Image {
+        file,
+        color_space,
+        wrap,
+        filter: TextureFilter::default(),
+        scale: [1.0; 2],
+        offset: [0.0; 2],
+        source: SourceId::default(),
+    };
     Texture::compile(&image, &assets).unwrap()
 }
 
@@ -49,6 +57,27 @@ fn srgb_agrees_with_published_values_and_its_inverse() {
         let linear = f64::from(Image::decode(&pixel, ColorSpace::Srgb).unwrap().pixel(0, 0)[0]);
         let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
         assert!((encoded * 255.0 - f64::from(code)).abs() < 1e-3, "{code}: {encoded}");
+    }
+}
+
+#[test]
+fn scale_and_offset_move_coordinates() {
+    let mut assets = MemoryAssets::default();
+    let file = assets.insert(png(image::GrayImage::from_fn(4, 4, |x, y| image::Luma([(16 * x + 4 * y) as u8]))));
+    let of = |scale, offset| {
+        let (color_space, wrap, filter) = (ColorSpace::Linear, [Wrap::Repeat; 2], TextureFilter::default());
+        Texture::compile(
+            &description::Texture::Image { file, color_space, wrap, filter, scale, offset, source: SourceId::default() },
+            &assets,
+        )
+    };
+    let (plain, moved) = (of([1.0; 2], [0.0; 2]).unwrap(), of([4.0, -2.0], [0.25, 0.5]).unwrap());
+    for (u, v) in [(0.0, 0.0), (0.3, 0.9), (-1.7, 2.2)] {
+        let (there, here) = (glam::DVec2::new(u, v), glam::DVec2::new(4.0 * u + 0.25, 0.5 - 2.0 * v));
+        assert_eq!(moved.at([there; 2].into()), plain.at([here; 2].into()));
+    }
+    for wrong in [f64::NAN, f64::INFINITY, 1e10] {
+        assert!(of([wrong, 1.0], [0.0; 2]).is_err() && of([1.0; 2], [0.0, wrong]).is_err(), "{wrong}");
     }
 }
 

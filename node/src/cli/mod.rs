@@ -36,11 +36,11 @@ mod verify;
 mod verify_farm;
 mod watch;
 
-use std::process;
+use std::{io::Write, process};
 
 use clap::{Parser, Subcommand};
 
-use crate::error::Result;
+use crate::error::{ExitCode, Result};
 
 /// Renders one heavy frame on every machine you have; any of them may die meanwhile.
 #[derive(Parser)]
@@ -122,13 +122,17 @@ fn run(command: Command) -> Result<()> {
     }
 }
 
-/// Whoever reads what is printed may stop reading, as `head` does: that is no fault.
+/// Whoever reads what is printed may stop reading, as `head` does: that is no fault. A disk that takes no more of it is one of a file.
 fn end_with_reader() {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
         let message = panic.payload().downcast_ref::<String>().map_or("", String::as_str);
         if message.starts_with("failed printing to stdout") && message.contains("Broken pipe") {
             process::exit(0);
+        }
+        if let Some(why) = message.strip_prefix("failed printing to std") {
+            let _ = writeln!(std::io::stderr(), "error: nothing can be written to std{why}");
+            process::exit(ExitCode::File as i32);
         }
         usual(panic);
     }));
@@ -140,7 +144,8 @@ pub fn main() -> process::ExitCode {
     match run(CommandLine::parse().command) {
         Ok(()) => process::ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            // What came of it is told by the exit code all the same.
+            let _ = writeln!(std::io::stderr(), "error: {error}");
             process::ExitCode::from(error.code as u8)
         }
     }

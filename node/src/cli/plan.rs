@@ -39,8 +39,8 @@ pub struct Args {
 
 fn power(text: &str) -> Result<f64, String> {
     match text.trim().parse() {
-        Ok(power) if power > 0.0 && f64::is_finite(power) => Ok(power),
-        _ => Err("a power is a number above 0".to_owned()),
+        Ok(power) if power > 0.0 && power <= 4096.0 => Ok(power),
+        _ => Err("a power is a number above 0, up to 4096".to_owned()),
     }
 }
 

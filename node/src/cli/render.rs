@@ -81,8 +81,9 @@ pub fn run(args: Args) -> Result<()> {
             show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output, args.show)?)
         }),
         (None, None) => {
-            let folder = local::folder()?;
-            block_on(here(&args, folder.path()))
+            // It goes when nothing runs any more that writes into it.
+            let mut folder = None;
+            block_on(async { here(&args, folder.insert(local::folder()?).path()).await })
         }
     }
 }

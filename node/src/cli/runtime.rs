@@ -1,6 +1,6 @@
 //! What every subcommand that talks needs: logs, a runtime, and an ear for the user's signals.
 
-use std::{future::Future, io::IsTerminal, thread, time::Duration};
+use std::{future::Future, io::IsTerminal, task::Poll, thread, time::Duration};
 
 use tokio::{
     runtime::Runtime,
@@ -42,26 +42,34 @@ pub fn runtime() -> Result<Runtime> {
 pub fn block_on<T>(work: impl Future<Output = Result<T>>) -> Result<T> {
     let runtime = runtime()?;
     let result = runtime.block_on(async {
+        // Before the work begins: what it leaves behind must not depend on how soon the signal comes.
+        let interrupted = interrupted();
         tokio::select! {
             // First, as it may know better what is to be said.
             biased;
             result = work => result,
-            () = interrupted() => Err(Error::new(ExitCode::Interrupted, "interrupted")),
+            () = interrupted => Err(Error::new(ExitCode::Interrupted, "interrupted")),
         }
     });
     runtime.shutdown_timeout(Duration::from_millis(100));
     result
 }
 
-/// Waits for Ctrl-C or SIGTERM.
-pub async fn interrupted() {
-    let (Ok(mut interrupt), Ok(mut terminate)) = (signal(SignalKind::interrupt()), signal(SignalKind::terminate())) else {
-        return std::future::pending().await;
-    };
-    tokio::select! {
-        _ = interrupt.recv() => {}
-        _ = terminate.recv() => {}
-    }
+/// Listens from now on for Ctrl-C, SIGTERM, and the end of the terminal, unless the user wants that to be ignored (`nohup`); waits for the first of them. To be called within a runtime.
+pub fn interrupted() -> impl Future<Output = ()> {
+    let kinds = [Some(SignalKind::interrupt()), Some(SignalKind::terminate()), (!ignores_hangup()).then(SignalKind::hangup)];
+    let mut signals: Vec<_> = kinds.into_iter().flatten().filter_map(|kind| signal(kind).ok()).collect();
+    std::future::poll_fn(move |context| {
+        let has_come = signals.iter_mut().any(|signal| signal.poll_recv(context).is_ready());
+        if has_come { Poll::Ready(()) } else { Poll::Pending }
+    })
+}
+
+/// Whether SIGHUP was to be ignored when the program began, as Linux tells (proc_pid_status(5)); elsewhere it is left alone.
+fn ignores_hangup() -> bool {
+    let Ok(status) = std::fs::read_to_string("/proc/self/status") else { return true };
+    let ignored = status.lines().find_map(|line| u64::from_str_radix(line.strip_prefix("SigIgn:")?.trim(), 16).ok());
+    ignored.is_none_or(|ignored| ignored & 1 == 1)
 }
 
 /// Counts how often this process was told to end, by Ctrl-C or SIGTERM.

@@ -153,6 +153,11 @@ fn scenario(args: &Args, nodes: usize, split: Split, assign: Assign) -> Result<S
     if let Some(speed) = args.speeds.iter().find(|speed| !(speed.is_finite() && **speed > 0.0)) {
         return Err(Error::new(ExitCode::Usage, format!("--speeds: {speed} is not a speed")).with_help("speeds are above 0"));
     }
+    if !(args.work > 0.0 && args.work <= 1e9) {
+        return Err(
+            Error::new(ExitCode::Usage, format!("--work: {} is no number of seconds", args.work)).with_help("it is above 0, up to 1e9")
+        );
+    }
     let speeds = if args.speeds.is_empty() { Scenario::speeds(args.seed, nodes) } else { args.speeds.clone() };
     let machines: Vec<(u32, f64)> = speeds.into_iter().map(|speed| (args.lanes, speed)).collect();
     let mut scenario = Scenario::plain(args.seed, &machines, split, assign);

@@ -52,6 +52,12 @@ pub const GLOBALS: [&str; 30] = [
 /// `table.move` of more elements than this is refused; `table.sort` compares them where interrupts happen.
 const LONG_LIST: i64 = 1 << 16;
 
+/// Texts longer than this take long to compare.
+const LONG_TEXT: usize = 1 << 12;
+
+/// Most that the lengths of a long pattern and of the text may multiply to: all of a set, `[...]`, is compared with each character.
+const PATTERN_WORK: usize = 1 << 30;
+
 /// Elements that `table.move` moves at the most.
 const MOVE_LIMIT: f64 = 16_777_216.0;
 
@@ -113,6 +119,21 @@ fn install_strings(lua: &Lua, string: &Table) -> mlua::Result<()> {
         None => relay(lua, &raw, arguments),
     };
     string.set("find", lua.create_function(find)?)?;
+    for name in ["find", "match", "gmatch", "gsub"] {
+        let raw: Function = string.get(name)?;
+        let bounded = move |lua: &Lua, arguments: MultiValue| {
+            let length = |at: usize| arguments.get(at).and_then(Value::as_string).map_or(0, |text| text.as_bytes().len());
+            if name != "find" || plain_search(&arguments).is_none() {
+                let (text, pattern) = (length(0), length(1));
+                if pattern > LONG_TEXT && text.saturating_mul(pattern) > PATTERN_WORK {
+                    let what = format!("string.{name}: a pattern of {pattern} bytes is too long for a text of {text}");
+                    return Err(Place::of_running(lua).fault(what).into());
+                }
+            }
+            relay(lua, &raw, arguments)
+        };
+        string.set(name, lua.create_function(bounded)?)?;
+    }
     let raw: Function = string.get("split")?;
     let split = move |lua: &Lua, arguments: MultiValue| match (arguments.front(), arguments.get(1)) {
         (Some(Value::String(text)), Some(Value::String(separator))) if separator.as_bytes().len() > 1 => split(lua, text, separator),
@@ -163,7 +184,8 @@ fn split(lua: &Lua, text: &LuaString, separator: &LuaString) -> mlua::Result<Mul
 fn install_tables(lua: &Lua, table: &Table) -> mlua::Result<()> {
     let raw: Function = table.get("move")?;
     let shift = move |lua: &Lua, arguments: MultiValue| {
-        let number = |at: usize| arguments.get(at).and_then(Value::as_number).unwrap_or(0.0);
+        // Luau takes numbers written as text, too.
+        let number = |at: usize| lua.coerce_number(arguments.get(at).cloned().unwrap_or_default()).ok().flatten().unwrap_or(0.0);
         if number(2) - number(1) > MOVE_LIMIT {
             return Err(Place::of_running(lua).fault(format!("table.move: more than {MOVE_LIMIT} elements")).into());
         }
@@ -173,13 +195,19 @@ fn install_tables(lua: &Lua, table: &Table) -> mlua::Result<()> {
     let raw: Function = table.get("sort")?;
     let ascending = sandbox::load(lua, "[sort]", "return function(a, b) return a < b end")?.call::<Function>(())?;
     let sort = move |lua: &Lua, mut arguments: MultiValue| {
-        let long = arguments.front().and_then(Value::as_table).is_some_and(|list| list.raw_len() as i64 > LONG_LIST);
-        if long && arguments.get(1).is_none_or(Value::is_nil) {
+        let takes_long = arguments.front().and_then(Value::as_table).is_some_and(takes_long);
+        if takes_long && arguments.get(1).is_none_or(Value::is_nil) {
             arguments = MultiValue::from_iter([arguments.pop_front().unwrap_or_default(), Value::Function(ascending.clone())]);
         }
         relay(lua, &raw, arguments)
     };
     table.set("sort", lua.create_function(sort)?)
+}
+
+/// Whether a list has so many values, or one so long, that sorting it must be interruptible.
+fn takes_long(list: &Table) -> bool {
+    let is_long = |value: mlua::Result<Value>| matches!(value, Ok(Value::String(text)) if text.as_bytes().len() > LONG_TEXT);
+    list.raw_len() as i64 > LONG_LIST || (1..=list.raw_len()).any(|at| is_long(list.raw_get(at)))
 }
 
 /// Calls a function of Luau's library from Rust: what goes wrong in it is put at the script's line.

@@ -136,11 +136,7 @@ pub struct Guard {
 struct GuardState {
     deadline: Option<Instant>,
     end: Option<End>,
-    checks: u32,
 }
-
-/// Reading the clock takes longer than a turn of a small loop: it is done at one of so many interrupts.
-const CHECKS: u32 = 16;
 
 impl Guard {
     fn state(&self) -> std::sync::MutexGuard<'_, GuardState> {
@@ -166,8 +162,7 @@ impl Guard {
     /// Fails once the script is ended.
     pub fn check(&self, lua: &Lua) -> mlua::Result<()> {
         let mut state = self.state();
-        state.checks = (state.checks + 1) % CHECKS;
-        if state.checks == 0 && state.end.is_none() && state.deadline.is_some_and(|deadline| Instant::now() > deadline) {
+        if state.end.is_none() && state.deadline.is_some_and(|deadline| Instant::now() > deadline) {
             state.end = Some(End::Time { place: Place::of_running(lua) });
         }
         if state.end.is_some() { Err(Fault::new("the script was ended").into()) } else { Ok(()) }

@@ -37,7 +37,7 @@ const EVENTS: TableDefinition<u64, (u64, &[u8])> = TableDefinition::new("events"
 const BEGINNING: TableDefinition<u32, &[u8]> = TableDefinition::new("beginning");
 
 /// Changes with every change of what an event or a snapshot holds.
-const FORMAT: u32 = 6;
+const FORMAT: u32 = 7;
 
 /// The journal of one coordinator, in a folder of its own.
 pub struct Journal {

@@ -231,6 +231,8 @@ fn frame() -> Frame {
         color_space: ColorSpace::Linear,
         wrap: [Wrap::Repeat, Wrap::Mirror],
         filter: TextureFilter::Bilinear,
+        scale: [1.0; 2],
+        offset: [0.0; 2],
         source: SourceId::default(),
     };
     let lights = vec![

@@ -15,7 +15,15 @@ fn map(direction: DVec3, assets: &mut MemoryAssets) -> Texture {
     let mut bytes = Cursor::new(Vec::new());
     image::DynamicImage::from(image).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     let (file, filter) = (assets.insert(bytes.into_inner()), TextureFilter::Bilinear);
-    Texture::Image { file, color_space: ColorSpace::Linear, wrap: [Wrap::Repeat; 2], filter, source: SourceId::default() }
+    Texture::Image {
+        file,
+        color_space: ColorSpace::Linear,
+        wrap: [Wrap::Repeat; 2],
+        filter,
+        scale: [1.0; 2],
+        offset: [0.0; 2],
+        source: SourceId::default(),
+    }
 }
 
 /// What a smooth coat on black shows of a lamp of radiance 1 in some direction, seen straight from `side`; the coat and its base have bumps that face these ways.

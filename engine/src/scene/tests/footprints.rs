@@ -21,7 +21,15 @@ fn checker(side: u32) -> Vec<u8> {
 fn textured(objects: Vec<Object>, side: u32, filter: TextureFilter) -> (Frame, MemoryAssets) {
     let (mut frame, mut assets) = (frame(objects), MemoryAssets::default());
     let (file, wrap) = (assets.insert(checker(side)), [Wrap::Repeat; 2]);
-    frame.scene.textures = vec![Texture::Image { file, color_space: ColorSpace::Linear, wrap, filter, source: SourceId::default() }];
+    frame.scene.textures = vec![Texture::Image {
+        file,
+        color_space: ColorSpace::Linear,
+        wrap,
+        filter,
+        scale: [1.0; 2],
+        offset: [0.0; 2],
+        source: SourceId::default(),
+    }];
     frame.scene.materials[0] = Material::Diffuse { reflectance: [1.0; 3], texture: Some(0) };
     (frame, assets)
 }

@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use super::*;
 use crate::{
     assets::tests::glb::Gltf,
-    description::{Model, ModelFormat},
+    description::{Environment, Model, ModelFormat},
     light::Light,
     part::{Rect, SampleRange, render},
     scene::Surface,
@@ -149,6 +149,26 @@ fn what_is_read_but_not_drawn_is_named() {
     let blends = "material \"m\": alpha blending is not modelled; cut away where it is less than half opaque";
     assert_eq!(warnings, ["material \"m\": gloss is not modelled; drawn diffuse", blends]);
     assert!(scene.materials.iter().any(|material| material.blends && material.alpha_cutoff == Some(0.5)));
+}
+
+/// Black and a quarter there, before a white sky: pixels whose samples all look at their middles are three quarters bright all the same.
+#[test]
+fn what_blends_does_so_in_every_pixel() {
+    let material = json!({
+        "alphaMode": "BLEND", "pbrMetallicRoughness": { "metallicFactor": 0, "baseColorFactor": [0, 0, 0, 0.25] },
+        "extensions": { "KHR_materials_specular": { "specularFactor": 0 } },
+    });
+    let (mut frame, assets) = frame_of(square(material, &[[255; 4]], |_| {}), DAffine3::IDENTITY);
+    frame.scene.background = Environment::Constant([1.0; 3]);
+    frame.camera = Camera::pinhole([0.5, 0.5, 3.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0], 5.0);
+    frame.film = Film { width: 8, height: 8, filter: Filter::Point };
+    frame.render = Render::Path { max_depth: 4, roulette_depth: 4, smooth_terminator: false };
+    let scene = Scene::compile_around(&frame, &assets, DVec3::ZERO).unwrap();
+    let (rect, samples) = (Rect { x: 0, y: 0, width: 8, height: 8 }, SampleRange { first: 0, count: 1024 });
+    let part = render(&scene, rect, samples, &AtomicBool::new(false)).unwrap();
+    // Five standard errors of 1024 tosses.
+    let wrong = part.pixels.iter().filter(|pixel| (pixel[0] - 0.75).abs() > 5.0 * 0.0135).count();
+    assert_eq!(wrong, 0, "{:?}", part.pixels);
 }
 
 #[test]

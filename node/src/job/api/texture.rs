@@ -6,14 +6,16 @@ use tessera_engine::description::{ColorSpace, Texture, TextureFilter, Wrap};
 use super::{Form, Function, material::BRIGHTEST, model::asset};
 use crate::job::{
     handle::Thing,
-    keys::{FINITE, Field, Keys, POSITIVE},
+    keys::{FINITE, Field, Keys, POSITIVE, Range},
 };
+
+const COORDINATE: Range = Range { lowest: -1e6, highest: 1e6, open: false, words: "a number from -1e6 to 1e6" };
 
 pub const FUNCTIONS: &[Function] = &[
     Function { path: "checker", form: Form::Table, keys: &["even", "odd", "size", "name"], make: checker },
     Function { path: "gradient", form: Form::Table, keys: &["from", "to", "start", "end", "name"], make: gradient },
     Function { path: "noise", form: Form::Table, keys: &["low", "high", "size", "octaves", "seed", "name"], make: noise },
-    Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "filter", "name"], make: image },
+    Function { path: "image", form: Form::Table, keys: &["file", "color_space", "wrap", "filter", "scale", "offset", "name"], make: image },
 ];
 
 fn checker(keys: &Keys) -> mlua::Result<Value> {
@@ -56,8 +58,12 @@ fn image(keys: &Keys) -> mlua::Result<Value> {
     let wrap = keys.or("wrap", [Wrap::Repeat; 2], wrap)?;
     let filters = [("bilinear", TextureFilter::Bilinear), ("trilinear", TextureFilter::Trilinear)];
     let filter = keys.or("filter", TextureFilter::Bilinear, |field| field.choice(&filters))?;
+    let scale = keys.or("scale", [1.0; 2], |field| {
+        if field.value.is_table() { field.numbers(COORDINATE) } else { field.number(COORDINATE).map(|scale| [scale; 2]) }
+    })?;
+    let offset = keys.or("offset", [0.0; 2], |field| field.numbers(COORDINATE))?;
     let (_, id) = asset(&file, &name)?;
-    keys.make(|source| Thing::Texture(Texture::Image { file: id, color_space, wrap, filter, source }))
+    keys.make(|source| Thing::Texture(Texture::Image { file: id, color_space, wrap, filter, scale, offset, source }))
 }
 
 /// One word for both directions, or a list of two.

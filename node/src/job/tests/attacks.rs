@@ -43,6 +43,7 @@ fn no_loop_outlives_its_time() {
         "local t = setmetatable({}, { __index = function() while true do end end }); pcall(function() return t.x end) while true do end",
         "local t = setmetatable({}, { __tostring = function() while true do end end }); error(t)",
         "local t = {} for i = 1, 1e5 do t[i] = i end while true do table.sort(t, function(a, b) return a < b end) end",
+        "local q = string.rep('x', 1e7) local a, b, t = q .. 'a', q .. 'b', {} for i = 1, 60000 do t[i] = i % 2 == 0 and a or b end table.sort(t)",
         "for i in setmetatable({}, { __iter = function() return function() return 1 end end }) do end",
     ];
     let outcomes = attacks.map(|script| (script, attack(script, SHORT)));

@@ -157,7 +157,7 @@ fn lights_cameras_and_textures_are_described() {
     let script = job_with(
         "return tessera.job {
   scene = tessera.scene {
-    objects = { tessera.plane { material = tessera.diffuse { reflectance = tessera.image { file = 'tiny.png', wrap = {'clamp', 'mirror'}, color_space = 'linear', filter = 'trilinear' } } } },
+    objects = { tessera.plane { material = tessera.diffuse { reflectance = tessera.image { file = 'tiny.png', wrap = {'clamp', 'mirror'}, scale = 3, offset = {0.5, -1}, color_space = 'linear', filter = 'trilinear' } } } },
     lights = { tessera.point { position = {1, 2, 3}, intensity = 5, falloff = 'none' }, tessera.directional { direction = {0, -1, 0}, irradiance = {1, 2, 3} } },
   },
   camera = tessera.perspective { eye = {0, 1, 5}, look_at = {0, 1, 0}, up = {0, 1, 0}, fov = 60 },
@@ -175,8 +175,9 @@ fn lights_cameras_and_textures_are_described() {
     ));
     assert!(matches!(frame.scene.lights[1], Light::Directional { irradiance: [1.0, 2.0, 3.0], .. }));
     assert!(matches!(frame.camera, Camera::Perspective { horizontal_fov: 60.0, .. }));
-    let Texture::Image { wrap, color_space, filter, file, .. } = frame.scene.textures[0] else { panic!() };
+    let Texture::Image { wrap, color_space, filter, file, scale, offset, .. } = frame.scene.textures[0] else { panic!() };
     assert_eq!((wrap, color_space, filter), ([Wrap::Clamp, Wrap::Mirror], ColorSpace::Linear, TextureFilter::Trilinear));
+    assert_eq!((scale, offset), ([3.0; 2], [0.5, -1.0]));
     assert_eq!(job.description.assets, [file]);
     assert!(matches!(frame.scene.materials[0], Material::Diffuse { texture: Some(0), .. }));
 }
