@@ -38,7 +38,7 @@ pub fn runtime() -> Result<Runtime> {
 /// Runs a client's work until it is done or the user interrupts it.
 ///
 /// # Errors
-/// Those of the work; [`ExitCode::Interrupted`] on Ctrl-C or SIGTERM.
+/// Those of the work; [`ExitCode::Interrupted`] when the user interrupts it: see [`interrupted`].
 pub fn block_on<T>(work: impl Future<Output = Result<T>>) -> Result<T> {
     let runtime = runtime()?;
     let result = runtime.block_on(async {

@@ -116,23 +116,12 @@ fn install_strings(lua: &Lua, string: &Table) -> mlua::Result<()> {
     let raw: Function = string.get("find")?;
     let find = move |lua: &Lua, arguments: MultiValue| match plain_search(&arguments) {
         Some((text, pattern, from)) => find_plain(lua, &text, &pattern, from),
-        None => relay(lua, &raw, arguments),
+        None => match_pattern(lua, "find", &raw, arguments),
     };
     string.set("find", lua.create_function(find)?)?;
-    for name in ["find", "match", "gmatch", "gsub"] {
+    for name in ["match", "gmatch", "gsub"] {
         let raw: Function = string.get(name)?;
-        let bounded = move |lua: &Lua, arguments: MultiValue| {
-            let length = |at: usize| arguments.get(at).and_then(Value::as_string).map_or(0, |text| text.as_bytes().len());
-            if name != "find" || plain_search(&arguments).is_none() {
-                let (text, pattern) = (length(0), length(1));
-                if pattern > LONG_TEXT && text.saturating_mul(pattern) > PATTERN_WORK {
-                    let what = format!("string.{name}: a pattern of {pattern} bytes is too long for a text of {text}");
-                    return Err(Place::of_running(lua).fault(what).into());
-                }
-            }
-            relay(lua, &raw, arguments)
-        };
-        string.set(name, lua.create_function(bounded)?)?;
+        string.set(name, lua.create_function(move |lua: &Lua, arguments| match_pattern(lua, name, &raw, arguments))?)?;
     }
     let raw: Function = string.get("split")?;
     let split = move |lua: &Lua, arguments: MultiValue| match (arguments.front(), arguments.get(1)) {
@@ -140,6 +129,17 @@ fn install_strings(lua: &Lua, string: &Table) -> mlua::Result<()> {
         _ => relay(lua, &raw, arguments),
     };
     string.set("split", lua.create_function(split)?)
+}
+
+/// Calls a function of Luau's library that looks for a pattern, its second argument, in its first, unless that might take long.
+fn match_pattern(lua: &Lua, name: &str, raw: &Function, arguments: MultiValue) -> mlua::Result<MultiValue> {
+    let length = |at: usize| arguments.get(at).and_then(Value::as_string).map_or(0, |text| text.as_bytes().len());
+    let (text, pattern) = (length(0), length(1));
+    if pattern > LONG_TEXT && text.saturating_mul(pattern) > PATTERN_WORK {
+        let what = format!("string.{name}: a pattern of {pattern} bytes is too long for a text of {text}");
+        return Err(Place::of_running(lua).fault(what).into());
+    }
+    relay(lua, raw, arguments)
 }
 
 /// The arguments of `string.find`, where it searches for a text and not for a pattern.

@@ -71,6 +71,15 @@ fn no_memory_beyond_the_limit() {
 }
 
 #[test]
+fn what_cannot_be_interrupted_is_refused() {
+    for name in ["find", "match", "gmatch", "gsub"] {
+        let message = attack(&format!("string.{name}(string.rep('a', 1e6), '[' .. string.rep('b', 1e6) .. 'a]*', '')"), SMALL);
+        assert_eq!(message, format!("jobs/job.lua:1: string.{name}: a pattern of 1000004 bytes is too long for a text of 1000000"));
+    }
+    assert_eq!(attack("table.move({}, '1', '2147483000', '2', {})", SMALL), "jobs/job.lua:1: table.move: more than 16777216 elements");
+}
+
+#[test]
 fn deep_recursion_is_a_plain_error() {
     let message = attack("local function f() return 1 + f() end f()", SMALL);
     assert!(message.contains("stack overflow") && message.starts_with("jobs/job.lua:1:"), "{message}");
