@@ -32,7 +32,8 @@ fn a_node_killed_and_restarted_comes_back_with_a_new_life() {
     assert_eq!(over.len(), 1, "{over:?}");
     assert_eq!(over[0]["detail"], "it started anew");
     let lost: Vec<_> = attempts(&manifest).into_iter().filter(|attempt| attempt["outcome"] == "lost").collect();
-    assert!(lost.len() <= 2, "one that was rendered and one that waited: {lost:?}");
+    // How many, depends on how long the lane had to wait for parts before: on this machine's disk and load.
+    assert!(lost.iter().all(|attempt| attempt["end"] == over[0]["time"]), "what its old life held, and nothing later: {lost:#?}");
     let begun = attempts(&manifest).into_iter().map(|attempt| time(&attempt["start"])).filter(|start| *start > time(&over[0]["time"]));
     println!("back at work {:.3} s after its new life joined", begun.fold(f64::INFINITY, f64::min) - time(&over[0]["time"]));
 }
