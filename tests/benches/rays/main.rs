@@ -1,5 +1,5 @@
 //! Rays against Embree, on one thread: `tests/compare/rays`, which fetches Embree, or, where `EMBREE_LIB` names its library, `cargo bench -p
-//! tessera-tests --bench rays`. Names of scenes as arguments leave the others out.
+//! tessera-tests --bench rays`. Names of scenes, or of sets of their rays (`hall/ao`), as arguments leave the others out.
 //!
 //! Prints, for every scene and set of rays, million rays a second of each contender in proportion to Embree's own default (single rays, build quality
 //! high), and the share of rays whose hits differ from Embree's robust ones. Contenders take turns on chunks of rays, so that a machine whose
@@ -65,8 +65,13 @@ fn main() {
     };
     let embree = Embree::load(&library);
     let mut ratios = Vec::new();
-    for model in scenes::all().filter(|model| names.is_empty() || names.iter().any(|name| name == model.name)) {
-        compare(&embree, &model, &mut ratios);
+    let is_asked =
+        |scene: &str, set: &str| names.is_empty() || names.iter().any(|name| *name == scene || *name == format!("{scene}/{set}"));
+    for (scene, make) in scenes::ALL {
+        let is_needed = names.is_empty() || names.iter().any(|name| name.split('/').next() == Some(scene));
+        if let Some(model) = is_needed.then(make).flatten() {
+            compare(&embree, &model, |set| is_asked(scene, set), &mut ratios);
+        }
     }
     println!("geometric mean over {} sets: {:.3}", ratios.len(), geometric_mean(&ratios));
 }
@@ -75,7 +80,7 @@ fn geometric_mean(ratios: &[f64]) -> f64 {
     (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp()
 }
 
-fn compare(embree: &Embree, model: &Model, ratios: &mut Vec<f64>) {
+fn compare(embree: &Embree, model: &Model, is_asked: impl Fn(&str) -> bool, ratios: &mut Vec<f64>) {
     let begin = Instant::now();
     let scene = model.compile();
     let ours = begin.elapsed().as_secs_f64();
@@ -84,7 +89,7 @@ fn compare(embree: &Embree, model: &Model, ratios: &mut Vec<f64>) {
     let theirs = begin.elapsed().as_secs_f64();
     let robust = embree.scene(model, true);
     println!("{}: {} triangles; compiled in {ours:.2} s, Embree's tree in {theirs:.2} s", model.name, model.triangles.len());
-    for set in sets::of(model, &scene) {
+    for set in sets::of(model, &scene).into_iter().filter(|set| is_asked(set.name)) {
         let any = set.query == Query::Any;
         let mut contenders = vec![
             Contender::new("embree", |rays, out| fast.trace(rays, any, out)),

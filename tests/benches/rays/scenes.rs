@@ -29,11 +29,16 @@ pub struct Model {
     gltf: Option<Vec<u8>>,
 }
 
-/// All scenes, made one after the other.
-pub fn all() -> impl Iterator<Item = Model> {
-    let makers: [fn() -> Option<Model>; 7] = [|| Some(knot()), || Some(hall()), || Some(needles()), || Some(field()), bunny, engine, truck];
-    makers.into_iter().filter_map(|make| make())
-}
+/// Names of all scenes, and what makes them.
+pub const ALL: [(&str, fn() -> Option<Model>); 7] = [
+    ("knot", || Some(knot())),
+    ("hall", || Some(hall())),
+    ("needles", || Some(needles())),
+    ("field", || Some(field())),
+    ("bunny", bunny),
+    ("engine", engine),
+    ("truck", truck),
+];
 
 impl Model {
     fn new(name: &'static str, eye: [f64; 3], look_at: [f64; 3], half_view: f64, lamp: [f64; 3]) -> Self {
