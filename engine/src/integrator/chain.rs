@@ -8,20 +8,21 @@ use super::{
     shading::Shading,
 };
 use crate::{
-    light::Caustics,
+    light::{Caustics, Region},
     material::{Recipe, Travel},
     sampling::Sampler,
     scene::Tracer,
     shape::Surface,
 };
 
-/// How many of the points that count fully send a ray to where gathered light may come from: more cost more time than they take away noise.
+/// How many of the points that count fully, where gathered light is neither bright nor dim, send a ray to where it may come from: more cost more time than they take away noise.
 const SENT: f64 = 0.7;
 
-/// The share of points with this throughput that send such a ray: noise is least for the time where it goes with what they count.
+/// The share of points in a region that send such a ray, where the largest component of a path's throughput is this: noise is least for the time where it goes with what they
+/// count, and with the root of how bright gathered light is there: what chance finds of rare light varies as much as there is of it.
 #[inline(always)]
-pub fn sent(throughput: DVec3) -> f64 {
-    (SENT * throughput.max_element()).min(1.0)
+fn sent(throughput: f64, region: &Region) -> f64 {
+    (SENT * throughput * region.brilliance()).min(1.0)
 }
 
 /// A ray whose direction was one of many.
@@ -33,8 +34,8 @@ pub struct Chain {
     pub direction: DVec3,
     /// The density by solid angle with which it was chosen.
     pub pdf: f64,
-    /// See [`sent`].
-    pub sent: f64,
+    /// The largest component of the path's throughput there.
+    pub throughput: f64,
 }
 
 impl<const MEDIA: bool> Path<'_, MEDIA> {
@@ -58,13 +59,12 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
         walk: &Walk,
         sets: u32,
     ) -> DVec3 {
-        let sets = set::GATHERED + sets;
-        let sent = sent(walk.throughput);
+        let Some(region) = caustics.at(surface.point) else { return DVec3::ZERO };
+        let (sets, sent) = (set::GATHERED + sets, sent(walk.throughput.max_element(), &region));
         if walk.sampler.one(sets + set::LIGHT) >= sent {
             return DVec3::ZERO;
         }
-        let proposed = caustics.sample(surface.point, walk.sampler.one(sets + set::PLACE), walk.sampler.pair(sets + set::PLACE));
-        let Some((direction, density)) = proposed else { return DVec3::ZERO };
+        let (direction, density) = region.sample(walk.sampler.one(sets + set::PLACE), walk.sampler.pair(sets + set::PLACE));
         let (f, pdf) = shading.evaluate(direction);
         if f == DVec3::ZERO {
             return DVec3::ZERO;
@@ -134,5 +134,6 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
 
 #[inline(never)]
 fn share(caustics: &Caustics, chain: Chain) -> f64 {
-    chain.pdf / (chain.pdf + chain.sent * caustics.pdf(chain.point, chain.direction))
+    let looked_for = |region: Region| sent(chain.throughput, &region) * region.pdf(chain.direction);
+    chain.pdf / (chain.pdf + caustics.at(chain.point).map_or(0.0, looked_for))
 }

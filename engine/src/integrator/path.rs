@@ -4,7 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::{
     Integrator, RayCounts,
-    chain::{self, Chain},
+    chain::Chain,
     found,
     shading::{self, Shading},
     sought::Sought,
@@ -223,7 +223,7 @@ impl<const MEDIA: bool> Path<'_, MEDIA> {
                         point: vertex.point,
                         direction,
                         pdf: scattered.pdf,
-                        sent: chain::sent(walk.throughput),
+                        throughput: walk.throughput.max_element(),
                     });
                 }
                 walk.ray = match (&met, vertex.normal) {

@@ -68,8 +68,13 @@ enum Node {
 struct Cell {
     bounds: Bounds,
     middle: DVec3,
-    /// Of a surface in it, for each photon.
+    /// Of a surface in it.
     area: f64,
+    photons: u32,
+    /// Of all of them.
+    flux: f64,
+    /// See [`Region::brilliance`].
+    brilliance: f64,
     /// The first of its beams, and the one behind its last.
     beams: [u32; 2],
 }
@@ -92,6 +97,7 @@ impl Caustics {
         let mut caustics = Self::default();
         if !photons.is_empty() {
             caustics.divide(&mut photons);
+            caustics.compare();
         }
         caustics
     }
@@ -128,16 +134,25 @@ impl Caustics {
         self.divide(above);
     }
 
+    /// Puts the brilliance of all cells in proportion to that of the middle one.
+    fn compare(&mut self) {
+        let mut roots: Vec<f64> = self.cells.iter().map(Cell::root).filter(|root| *root > 0.0).collect();
+        roots.sort_unstable_by(f64::total_cmp);
+        let Some(middle) = roots.get(roots.len() / 2) else { return };
+        self.cells.iter_mut().for_each(|cell| cell.brilliance = cell.root() / middle);
+    }
+
     /// Adds a cell of photons within these bounds.
     fn cell(&mut self, bounds: Bounds, photons: &mut [Photon]) {
         let (middle, size) = ((bounds.min + bounds.max) * 0.5, bounds.max - bounds.min);
         // Two sides of a box that is flat.
-        let area = (size.x * size.y).max(size.y * size.z).max(size.z * size.x) / photons.len() as f64;
+        let area = (size.x * size.y).max(size.y * size.z).max(size.z * size.x);
         let margin = DVec3::splat(size.length() * MARGIN);
         let bounds = Bounds { min: bounds.min - margin, max: bounds.max + margin };
         // A point within the cell must be nearer to its middle than where rays come together.
         let most = 0.5 / (bounds.max - middle).length().max(f64::MIN_POSITIVE);
         let (first, total, mut up_to) = (self.beams.len(), flux(photons), 0.0);
+        let count = photons.len() as u32;
         photons.sort_by_key(|photon| photon.caster);
         let beams = photons.chunk_by(|a, b| a.caster == b.caster);
         let (beams, weak): (Vec<_>, Vec<_>) = beams.partition(|photons| flux(photons) >= LEAST * total);
@@ -150,63 +165,86 @@ impl Caustics {
             let lobes = self.lobes.add(photons.iter().map(|photon| (place(photon), photon.flux)).collect());
             self.beams.push(Beam { up_to, share, convergence, lobes });
         }
-        self.cells.push(Cell { bounds, middle, area, beams: [first, self.beams.len()].map(|number| number as u32) });
+        let beams = [first, self.beams.len()].map(|number| number as u32);
+        self.cells.push(Cell { bounds, middle, area, photons: count, flux: total, brilliance: 0.0, beams });
     }
 
+    /// What is known of gathered light about a point; `None` where there is none.
     #[inline]
-    fn at(&self, point: DVec3) -> Option<&Cell> {
+    pub fn at(&self, point: DVec3) -> Option<Region<'_>> {
+        let along = point.extend(0.0).to_array();
         let mut at = 0;
         loop {
             match *self.nodes.get(at)? {
-                Node::Split { place, axis, above } => at = if point[axis as usize] < place { at + 1 } else { above as usize },
+                Node::Split { place, axis, above } => at = if along[axis as usize & 3] < place { at + 1 } else { above as usize },
                 Node::Cell(cell) => {
                     let holds = |bounds: &Bounds| point.cmpge(bounds.min).all() && point.cmple(bounds.max).all();
-                    return self.cells.get(cell as usize).filter(|cell| holds(&cell.bounds));
+                    let cell = self.cells.get(cell as usize).filter(|cell| holds(&cell.bounds))?;
+                    let beams = &self.beams[cell.beams[0] as usize..cell.beams[1] as usize];
+                    return Some(Region { cell, beams, lobes: &self.lobes, beside: point - cell.middle });
                 }
             }
         }
     }
+}
 
-    /// The area of a surface about a point for each photon that fell there, in squares of scene units; 0 where none did.
-    pub fn area(&self, point: DVec3) -> f64 {
-        self.at(point).map_or(0.0, |cell| cell.area)
+impl Cell {
+    /// The root of the light on an area; 0 where photons lie on a line or in a point, of which nothing is known.
+    fn root(&self) -> f64 {
+        if self.area > 0.0 { (self.flux / self.area).sqrt() } else { 0.0 }
+    }
+}
+
+/// Gathered light about a point.
+#[derive(Debug)]
+pub struct Region<'c> {
+    cell: &'c Cell,
+    beams: &'c [Beam],
+    lobes: &'c Squares,
+    /// The point as seen from the cell's middle.
+    beside: DVec3,
+}
+
+impl Region<'_> {
+    /// The area of a surface for each photon that fell there, in squares of scene units.
+    pub fn area_of_photon(&self) -> f64 {
+        self.cell.area / f64::from(self.cell.photons)
     }
 
-    /// A direction in which gathered light may come to a point, for `pick` in [0, 1) and `u` in [0, 1)^2, and its density by solid angle. `None` where there is no such light.
+    /// The root of how much light falls on an area of a surface, in proportion to what it is in half of all regions; 0 where that cannot be told.
     #[inline]
-    pub fn sample(&self, point: DVec3, pick: f64, u: DVec2) -> Option<(DVec3, f64)> {
-        let cell = self.at(point)?;
-        let beams = self.beams_of(cell);
+    pub fn brilliance(&self) -> f64 {
+        self.cell.brilliance
+    }
+
+    /// A direction in which gathered light may come, for `pick` in [0, 1) and `u` in [0, 1)^2, and its density by solid angle.
+    #[inline]
+    pub fn sample(&self, pick: f64, u: DVec2) -> (DVec3, f64) {
+        let Self { beams, lobes, beside, .. } = *self;
         let number = beams.partition_point(|beam| beam.up_to <= pick).min(beams.len() - 1);
-        let Beam { share, convergence, lobes, .. } = beams[number];
-        let (place, density) = self.lobes.sample(lobes, u);
+        let Beam { share, convergence, lobes: own, .. } = beams[number];
+        let (place, density) = lobes.sample(own, u);
         let (of_middle, evenly) = folded(place);
         // Along this from the middle, to a point one away from `aside`: in units of the distance at which rays come together.
-        let aside = (point - cell.middle) * convergence;
+        let aside = beside * convergence;
         let along = aside.dot(of_middle);
         let length = along + (along * along + 1.0 - aside.length_squared()).sqrt();
         let direction = (of_middle * length - aside).normalize();
         let own = share * density * evenly * direction.dot(of_middle) / (length * length);
         let others = beams.iter().enumerate().filter(|(other, _)| *other != number);
-        Some((direction, own + others.map(|(_, beam)| self.pdf_of(beam, point - cell.middle, direction)).sum::<f64>()))
+        (direction, own + others.map(|(_, beam)| self.pdf_of(beam, direction)).sum::<f64>())
     }
 
-    /// The density with which [`Self::sample`] chooses a direction; 0 where there is no gathered light.
+    /// The density with which [`Self::sample`] chooses a direction.
     #[inline]
-    pub fn pdf(&self, point: DVec3, direction: DVec3) -> f64 {
-        let Some(cell) = self.at(point) else { return 0.0 };
-        self.beams_of(cell).iter().map(|beam| self.pdf_of(beam, point - cell.middle, direction)).sum()
+    pub fn pdf(&self, direction: DVec3) -> f64 {
+        self.beams.iter().map(|beam| self.pdf_of(beam, direction)).sum()
     }
 
+    /// A beam's part of the density of a direction.
     #[inline]
-    fn beams_of(&self, cell: &Cell) -> &[Beam] {
-        &self.beams[cell.beams[0] as usize..cell.beams[1] as usize]
-    }
-
-    /// A beam's part of the density of a direction at a point beside the middle.
-    #[inline]
-    fn pdf_of(&self, beam: &Beam, beside: DVec3, direction: DVec3) -> f64 {
-        let (of_middle, factor) = from_middle(beside, beam.convergence, direction);
+    fn pdf_of(&self, beam: &Beam, direction: DVec3) -> f64 {
+        let (of_middle, factor) = from_middle(self.beside, beam.convergence, direction);
         let (place, evenly) = unfolded(of_middle);
         beam.share * self.lobes.pdf(beam.lobes, place) * evenly * factor
     }

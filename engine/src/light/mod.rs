@@ -12,7 +12,7 @@ use glam::DVec3;
 
 pub use self::{
     area::{Area, Emitter, EmitterSample},
-    caustics::{Begin, Caustics, Departing, Photon, Sources},
+    caustics::{Begin, Caustics, Departing, Photon, Region, Sources},
     choice::{Arriving, LightSampler, Vertex},
     delta::{Light, LightSample},
     environment::{Environment, ImageEnvironment, turned},

@@ -67,26 +67,28 @@ fn directions_are_proposed_as_often_as_the_density_says() {
         let photons = photons(beyond);
         let caustics = Caustics::new(photons.clone());
         for point in [DVec3::new(0.1, 0.0, 0.3), DVec3::new(0.26, 0.0, 0.24), DVec3::new(0.4, 0.01, 0.45)] {
+            let region = caustics.at(point).unwrap();
             // All there are, and those of half the sphere.
             let (mut whole, mut half) = (0.0, 0.0);
             let share = 1.0 / f64::from(1 << 18);
             for (_, u) in numbers(1 << 18) {
                 let (direction, evenly) = folded(u);
-                let part = caustics.pdf(point, direction) * share / evenly;
+                let part = region.pdf(direction) * share / evenly;
                 whole += part;
                 half += if direction.x > 0.0 { part } else { 0.0 };
             }
             assert!((whole - 1.0).abs() < 0.02, "{beyond} {point}: {whole}");
             let mut proposed = 0.0;
             for (pick, u) in numbers(1 << 14) {
-                let (direction, density) = caustics.sample(point, pick, u).unwrap();
-                assert!((density / caustics.pdf(point, direction) - 1.0).abs() < 1e-9);
+                let (direction, density) = region.sample(pick, u);
+                assert!((density / region.pdf(direction) - 1.0).abs() < 1e-9);
                 proposed += if direction.x > 0.0 { 1.0 / f64::from(1 << 14) } else { 0.0 };
             }
             assert!((proposed - half).abs() < 0.02, "{beyond} {point}: {proposed} {half}");
         }
         // Where light comes from is proposed far more often than by chance.
-        let mean = photons.iter().map(|photon| caustics.pdf(photon.point, photon.towards)).sum::<f64>() / photons.len() as f64;
+        let told = |photon: &Photon| caustics.at(photon.point).unwrap().pdf(photon.towards);
+        let mean = photons.iter().map(told).sum::<f64>() / photons.len() as f64;
         assert!(mean > 3.0, "{beyond}: {mean}");
     }
 }
@@ -94,12 +96,31 @@ fn directions_are_proposed_as_often_as_the_density_says() {
 #[test]
 fn nothing_is_proposed_where_no_light_was_gathered() {
     let caustics = Caustics::new(photons(5.0));
-    assert!(caustics.sample(DVec3::new(0.2, 1.0, 0.2), 0.5, DVec2::splat(0.5)).is_none());
-    assert_eq!(caustics.pdf(DVec3::new(3.0, 0.0, 0.2), DVec3::Y), 0.0);
-    assert!(Caustics::new(Vec::new()).sample(DVec3::ZERO, 0.5, DVec2::splat(0.5)).is_none());
+    assert!(caustics.at(DVec3::new(0.2, 1.0, 0.2)).is_none());
+    assert!(caustics.at(DVec3::new(3.0, 0.0, 0.2)).is_none());
+    assert!(Caustics::new(Vec::new()).at(DVec3::ZERO).is_none());
     // All at one point.
     let one = Photon { point: DVec3::ONE, ..photons(5.0)[0] };
-    assert!(Caustics::new(vec![one; 1000]).sample(DVec3::ONE, 0.5, DVec2::splat(0.5)).is_some());
+    assert!(Caustics::new(vec![one; 1000]).at(DVec3::ONE).is_some());
+}
+
+/// Nine tenths of all light fall on a quarter of the floor; a little falls on one point beside it, of which nothing is known.
+#[test]
+fn regions_know_how_bright_they_are_in_proportion_to_others() {
+    let spread = |(_, u): (f64, DVec2)| {
+        let x = if u.x < 0.9 { u.x / 0.9 * 0.25 } else { 1.0 + (u.x - 0.9) * 7.5 };
+        Photon { point: DVec3::new(x, 0.0, u.y), flux: 1.0, ..photons(5.0)[0] }
+    };
+    let beside = Photon { point: DVec3::new(9.0, 0.0, 0.0), flux: 1e-9, ..photons(5.0)[0] };
+    let caustics = Caustics::new(numbers(1 << 14).map(spread).chain(std::iter::repeat_n(beside, 1000)).collect());
+    let mean = |from: f64| {
+        let at = |u: f64| caustics.at(DVec3::new(from + u * 0.2, 0.0, 0.5)).unwrap().brilliance();
+        (1..8).map(|i| at(f64::from(i) / 8.0)).sum::<f64>() / 7.0
+    };
+    let dim = (0.1_f64 / 0.75 / (0.9 / 0.25)).sqrt();
+    assert!((mean(0.0) - 1.0).abs() < 0.1, "{}", mean(0.0));
+    assert!((mean(1.2) / dim - 1.0).abs() < 0.1, "{} {dim}", mean(1.2));
+    assert_eq!(caustics.at(DVec3::new(9.0, 0.0, 0.0)).unwrap().brilliance(), 0.0);
 }
 
 /// Of an image of a dim sky with a bright spot, photons come from there alone; of one without, none are sent.
