@@ -9,7 +9,7 @@ use rustix::process::Signal;
 use tessera_node::simulate::Random;
 use tessera_tests::{
     farm::{JOB, Program, signal},
-    rig::{Rig, assert_once, attempts, committed, events, id, is_in, list, undisturbed, wait_until},
+    rig::{Rig, SAMPLES, assert_once, attempts, committed, events, id, is_in, list, undisturbed, wait_until},
 };
 
 const BINARY: &str = env!("CARGO_BIN_EXE_tessera-under-test");
@@ -129,6 +129,25 @@ fn what_nodes_render_while_the_coordinator_is_away_is_handed_in_afterwards() {
     assert!(committed(&before["jobs"][0]) >= 8);
     let lost: Vec<_> = attempts(&manifest).into_iter().filter(|attempt| attempt["outcome"] != "committed").collect();
     assert!(lost.is_empty(), "with one node no part has a reason to be tried twice: {lost:#?}");
+}
+
+/// The farm goes on with the job, and who waits for it need not do anything.
+#[test]
+fn a_client_that_waits_gets_its_files_though_the_coordinator_was_away() {
+    let mut rig = Rig::new(BINARY, &["attic"], 9);
+    rig.start("attic");
+    let arguments = ["render", "job.lua", "--set", SAMPLES, "-o", "out", "--coordinator", &rig.address, "--keys", "keys"];
+    let client = rig.program.start(&arguments);
+    rig.wait_for_parts(8);
+    rig.kill_coordinator();
+    thread::sleep(Duration::from_secs(1));
+    rig.restart_coordinator();
+    let done = client.finish();
+    assert_eq!(done.code, Some(0), "{}", done.errors);
+    for said in ["is lost", "waiting for it to come back with job 1", "is back"] {
+        assert!(done.errors.contains(said), "it never said {said:?}: {}", done.errors);
+    }
+    assert!(fs::read(rig.program.path("out/job.exr")).unwrap() == undisturbed(BINARY));
 }
 
 #[test]

@@ -3,23 +3,20 @@
 use std::{
     fs,
     io::Write,
-    net::{SocketAddr, ToSocketAddrs},
     path::{Path, PathBuf},
 };
 
-use quinn::{Connection, Endpoint, RecvStream, SendStream};
+use quinn::{RecvStream, SendStream};
 use tessera_engine::description::{AssetId, AssetSource, MemoryAssets};
-use tokio::{
-    io::AsyncWriteExt,
-    time::{sleep, timeout},
-};
+use tokio::io::AsyncWriteExt;
 
+use super::{link::Link, progress::Progress};
 use crate::{
     error::{Error, ExitCode, Result},
     farm::JobId,
     job::JobDescription,
-    limits::{CONNECT_TIMEOUT, FAREWELL, FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES, SILENCE_SAID_AFTER},
-    wire::{self, FileHeader, JobState, JobStatus, KeptJob, NodeStatus, Place, Refusal, Request, Response, Status, Terms, tls::Identity},
+    limits::{FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
+    wire::{self, FileHeader, JobState, KeptJob, Place, Request, Response, Status, Terms, tls::Identity},
 };
 
 /// How subcommands find their coordinator.
@@ -100,9 +97,7 @@ fn job_range(text: &str) -> Result<(u64, u64), String> {
 
 /// A connection to a coordinator.
 pub struct Client {
-    endpoint: Endpoint,
-    connection: Connection,
-    address: String,
+    link: Link,
     /// Where the coordinator has its assets, if that is known and this machine's.
     assets: Option<PathBuf>,
 }
@@ -116,12 +111,7 @@ impl Client {
         if let Some(warning) = identity.warning() {
             eprintln!("warning: {warning}");
         }
-        let socket = resolve(address).map_err(|error| unreachable(address, Refusal::other(error)))?;
-        let endpoint = wire::client(identity, socket)?;
-        let connecting = patiently(address, timeout(CONNECT_TIMEOUT, wire::connect(&endpoint, socket))).await;
-        let late = || Err(Refusal::other(format!("no answer within {} s", CONNECT_TIMEOUT.as_secs())));
-        let connection = connecting.unwrap_or_else(|_| late()).map_err(|refusal| unreachable(address, refusal))?;
-        Ok(Self { endpoint, connection, address: address.to_owned(), assets: None })
+        Ok(Self { link: Link::new(address, identity).await?, assets: None })
     }
 
     /// Puts assets into this folder, where its coordinator has its own: what is there need not be sent.
@@ -131,8 +121,7 @@ impl Client {
 
     /// Ends the connection.
     pub async fn close(&self) {
-        self.connection.close(0_u8.into(), b"");
-        let _ = timeout(FAREWELL, self.endpoint.wait_idle()).await;
+        self.link.close().await;
     }
 
     /// Submits a job with the assets that the coordinator does not have, and returns its number.
@@ -176,16 +165,20 @@ impl Client {
         Ok(())
     }
 
-    /// Follows a job to its end; `see` is told of every change.
+    /// Follows a job to its end, and shows how it fares.
     ///
     /// # Errors
-    /// When there is no such job, or the coordinator is lost.
-    pub async fn watch(&self, job: JobId, mut see: impl FnMut(&JobStatus, &[NodeStatus])) -> Result<JobState> {
+    /// When there is no such job, or the coordinator is lost for long.
+    pub async fn watch(&self, job: JobId, progress: &mut Progress) -> Result<JobState> {
+        self.persist(job, progress, async |progress| self.watched(job, progress).await).await
+    }
+
+    async fn watched(&self, job: JobId, progress: &mut Progress) -> Result<JobState> {
         let (_send, mut receive) = self.request(&Request::Watch { job }).await?;
         loop {
             match self.response(&mut receive).await? {
                 Response::Job(status, nodes) => {
-                    see(&status, &nodes);
+                    progress.see(&status, &nodes);
                     if status.state.is_over() {
                         return Ok(status.state);
                     }
@@ -195,11 +188,26 @@ impl Client {
         }
     }
 
+    /// Asks something about a job, and again each time that the coordinator has gone away and come back: the job outlives that.
+    async fn persist<T>(&self, job: JobId, progress: &mut Progress, mut ask: impl AsyncFnMut(&mut Progress) -> Result<T>) -> Result<T> {
+        loop {
+            match ask(progress).await {
+                // One in this process does not come back.
+                Err(error) if self.assets.is_none() && self.link.is_down() => self.link.restore(job, &error, progress).await?,
+                done => return done,
+            }
+        }
+    }
+
     /// Fetches a job's files into a folder. They take their names when all are there.
     ///
     /// # Errors
-    /// When there are none, when the folder cannot be written, or when the coordinator is lost.
-    pub async fn fetch(&self, job: JobId, folder: &Path) -> Result<Vec<PathBuf>> {
+    /// When there are none, when the folder cannot be written, or when the coordinator is lost for long.
+    pub async fn fetch(&self, job: JobId, folder: &Path, progress: &mut Progress) -> Result<Vec<PathBuf>> {
+        self.persist(job, progress, async |_| self.fetched(job, folder).await).await
+    }
+
+    async fn fetched(&self, job: JobId, folder: &Path) -> Result<Vec<PathBuf>> {
         let (_send, mut receive) = self.request(&Request::Fetch { job }).await?;
         let headers = match self.response(&mut receive).await? {
             Response::Files(headers) => headers,
@@ -312,7 +320,7 @@ impl Client {
     }
 
     async fn request(&self, request: &Request) -> Result<(SendStream, RecvStream)> {
-        let (mut send, receive) = self.connection.open_bi().await.map_err(|error| self.lost(error))?;
+        let (mut send, receive) = self.link.connection().open_bi().await.map_err(|error| self.lost(error))?;
         wire::write(&mut send, request, REQUEST_BYTES).await.map_err(|error| self.lost(error))?;
         Ok((send, receive))
     }
@@ -322,38 +330,20 @@ impl Client {
     }
 
     fn lost(&self, error: impl std::fmt::Display) -> Error {
-        let refusal = self.connection.close_reason().map_or_else(|| Refusal::other(error.to_string()), |reason| wire::explain(&reason));
-        if refusal.denied {
-            return unreachable(&self.address, refusal);
-        }
-        Error::new(ExitCode::Farm, format!("the coordinator at {} is lost: {refusal}", self.address))
+        self.link.lost(error)
     }
 
     fn unexpected(&self, response: &Response) -> Error {
         match response {
-            Response::Refused { reason } => Error::new(ExitCode::Farm, format!("the coordinator at {} refuses: {reason}", self.address)),
-            Response::Denied { reason } => Error::new(ExitCode::Denied, format!("the coordinator at {} refuses: {reason}", self.address)),
-            _ => Error::new(ExitCode::Farm, format!("the coordinator at {} answers something else", self.address)),
+            Response::Refused { reason } => {
+                Error::new(ExitCode::Farm, format!("the coordinator at {} refuses: {reason}", self.link.address()))
+            }
+            Response::Denied { reason } => {
+                Error::new(ExitCode::Denied, format!("the coordinator at {} refuses: {reason}", self.link.address()))
+            }
+            _ => Error::new(ExitCode::Farm, format!("the coordinator at {} answers something else", self.link.address())),
         }
     }
-}
-
-/// No connection, and why.
-pub fn unreachable(address: &str, refusal: Refusal) -> Error {
-    let (code, what) = if refusal.denied { (ExitCode::Denied, "refused at") } else { (ExitCode::Farm, "cannot reach the coordinator at") };
-    Error::new(code, format!("{what} {address}: {}", refusal.message))
-        .with_help(refusal.help.unwrap_or("check the address, that the coordinator runs, and that the keys are of its farm"))
-}
-
-/// Waits for a connection, and says so where that takes long.
-async fn patiently<T>(address: &str, connecting: impl Future<Output = T>) -> T {
-    tokio::pin!(connecting);
-    tokio::select! {
-        done = &mut connecting => return done,
-        () = sleep(SILENCE_SAID_AFTER) => {}
-    }
-    eprintln!("connecting to {address}: no answer yet");
-    connecting.await
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Error {
@@ -363,16 +353,4 @@ fn unwritable(path: &Path, error: &std::io::Error) -> Error {
 /// Files of one's own, readable by others as the umask says.
 fn plain_permissions() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)
-}
-
-/// The address of a host and port.
-///
-/// # Errors
-/// In words, when it has none.
-pub fn resolve(address: &str) -> Result<SocketAddr, String> {
-    let mut found = address.to_socket_addrs().map_err(|error| match error.kind() {
-        std::io::ErrorKind::InvalidInput => "it is not HOST:PORT, such as lead:7143".to_owned(),
-        _ => error.to_string(),
-    })?;
-    found.next().ok_or_else(|| "it has no address".to_owned())
 }

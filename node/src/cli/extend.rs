@@ -48,7 +48,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
     }
     let LoadedJob { description, assets, .. } = loaded;
     let mut extension = Extension::begin(&description, folder)?;
-    let progress = show.progress();
+    let mut progress = show.progress();
     progress.say(&format!("{}: has {} of {} samples", description.output.exr, extension.samples, description.frame.quality.samples));
     let mut files = Vec::new();
     while let Some(step) = extension.step() {
@@ -60,7 +60,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
             .tempdir()
             .map_err(|error| Error::new(ExitCode::File, format!("a temporary folder: {error}")))?;
         outcome(sequence::watch(client, &begun, show).await?)?;
-        client.fetch(job, parts.path()).await?;
+        client.fetch(job, parts.path(), &mut progress).await?;
         files = extension.add(&step, parts.path())?;
     }
     if files.is_empty() {

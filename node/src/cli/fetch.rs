@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::{
     client::{Access, job_number},
+    progress::Show,
     render::{check_samples, check_writable},
     runtime::{block_on, start_logs},
 };
@@ -28,7 +29,7 @@ pub fn run(args: Args) -> Result<()> {
     check_writable(&args.output)?;
     let files = block_on(async {
         let client = args.access.connect().await?;
-        let files = client.fetch(JobId(args.job), &args.output).await?;
+        let files = client.fetch(JobId(args.job), &args.output, &mut Show { json: false, quiet: false }.progress()).await?;
         client.close().await;
         Ok(files)
     })?;

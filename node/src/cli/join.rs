@@ -8,7 +8,7 @@ use std::{
 use quinn::Endpoint;
 use tokio::time::timeout;
 
-use super::client::{resolve, unreachable};
+use super::link::{resolve, unreachable};
 use crate::{
     error::{Error, ExitCode, Result},
     limits::{FAREWELL, JOIN_BYTES, JOIN_PATIENCE, TOKEN_BYTES},

@@ -15,6 +15,7 @@ mod fetch;
 mod here;
 mod join;
 mod keys;
+mod link;
 mod list;
 mod local;
 mod node;

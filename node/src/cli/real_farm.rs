@@ -17,7 +17,7 @@ use tokio::{
     time::sleep,
 };
 
-use super::{client::Client, local::node_command, render::outcome, runtime::block_on};
+use super::{client::Client, local::node_command, progress::Show, render::outcome, runtime::block_on};
 use crate::{
     error::{Error, ExitCode, Result},
     farm::{JobId, NodeState},
@@ -218,10 +218,11 @@ impl RealFarm {
     /// Waits for a job's end, and takes note of what holds for every job.
     async fn end(&self, job: JobId, loaded: &LoadedJob, figures: &mut Figures) -> Result<Manifest> {
         let client = self.client().await?;
-        outcome(client.watch(job, |_, _| ()).await?)?;
+        let mut progress = Show { json: false, quiet: true }.progress();
+        outcome(client.watch(job, &mut progress).await?)?;
         let folder = self.folder.path().join(format!("out-{}", job.0));
         fs::create_dir_all(&folder).map_err(|error| internal(&error))?;
-        client.fetch(job, &folder).await?;
+        client.fetch(job, &folder, &mut progress).await?;
         client.close().await;
         let picture = fs::read(folder.join(&loaded.description.output.exr)).map_err(|error| internal(&error))?;
         figures.pictures.insert(*blake3::hash(&picture).as_bytes());

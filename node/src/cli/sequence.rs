@@ -127,7 +127,7 @@ async fn follow_one(client: &Client, of: &Submitted, show: Show, output: &Path) 
     if !matches!(state, JobState::Finished | JobState::Incomplete(_)) {
         return ended;
     }
-    let files: Vec<PathBuf> = client.fetch(of.job, output).await?;
+    let files: Vec<PathBuf> = client.fetch(of.job, output, &mut show.progress()).await?;
     ended.map_err(|error| error.with_help(format!("what there is stands in {}", output.display())))?;
     report(show, &files, &output.join(&of.manifest), &of.warnings)
 }
@@ -141,7 +141,7 @@ pub async fn watch(client: &Client, of: &Submitted, show: Show) -> Result<JobSta
     if of.frame.is_some() {
         progress.say(&format!("{}job {}", of.label(), of.job.0));
     }
-    let state = client.watch(of.job, |job, nodes| progress.see(job, nodes)).await?;
+    let state = client.watch(of.job, &mut progress).await?;
     progress.end();
     Ok(state)
 }

@@ -26,7 +26,7 @@ pub fn run(args: Args) -> Result<()> {
     let mut progress = args.show.progress();
     let state = block_on(async {
         let client = args.access.connect().await?;
-        let state = client.watch(JobId(args.job), |job, nodes| progress.see(job, nodes)).await?;
+        let state = client.watch(JobId(args.job), &mut progress).await?;
         client.close().await;
         Ok(state)
     })?;

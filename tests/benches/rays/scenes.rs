@@ -29,8 +29,11 @@ pub struct Model {
     gltf: Option<Vec<u8>>,
 }
 
+/// Makes a scene, where there is what it needs.
+type Make = fn() -> Option<Model>;
+
 /// Names of all scenes, and what makes them.
-pub const ALL: [(&str, fn() -> Option<Model>); 7] = [
+pub const ALL: [(&str, Make); 7] = [
     ("knot", || Some(knot())),
     ("hall", || Some(hall())),
     ("needles", || Some(needles())),
