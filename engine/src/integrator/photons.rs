@@ -44,10 +44,10 @@ fn gathered(scene: &Scene) -> Caustics {
     let Some(sources) = scene.gathered() else { return Caustics::default() };
     // The first ones show where others are few: of light on a bright spot enough is known soon. Bright spots must not be left out either, so the root of the root.
     let scouts = sent(scene, &sources, 0..SCOUTS);
-    let scouted = Caustics::new(scouts.clone());
+    let scouted = Caustics::new(&scouts);
     let area = |photon: &Photon| scouted.at(photon.point).map_or(0.0, |region| region.area_of_photon());
     let sources = sources.aimed(scouts.iter().map(|photon| (photon.begin, area(photon).sqrt().sqrt())));
-    Caustics::new(sent(scene, &sources, SCOUTS..SCOUTS + COUNT))
+    Caustics::new(&sent(scene, &sources, SCOUTS..SCOUTS + COUNT))
 }
 
 /// Those that arrive, in order, of those with these numbers.

@@ -93,10 +93,10 @@ struct Beam {
 
 impl Caustics {
     /// Of photons, which count in the order in which they are given.
-    pub fn new(mut photons: Vec<Photon>) -> Self {
+    pub fn new(photons: &[Photon]) -> Self {
         let mut caustics = Self::default();
         if !photons.is_empty() {
-            caustics.divide(&mut photons);
+            caustics.divide(photons, &mut (0..photons.len() as u32).collect::<Vec<_>>());
             caustics.compare();
         }
         caustics
@@ -107,31 +107,35 @@ impl Caustics {
         self.cells.is_empty()
     }
 
-    /// Median by median across the longest side.
-    fn divide(&mut self, photons: &mut [Photon]) {
-        let bounds = Bounds::of(photons.iter().map(|photon| photon.point));
+    /// Median by median across the longest side. `chosen` are numbers of photons, in any order.
+    fn divide(&mut self, photons: &[Photon], chosen: &mut [u32]) {
+        let point = |number: u32| photons[number as usize].point;
+        let bounds = Bounds::of(chosen.iter().map(|&number| point(number)));
         let size = bounds.max - bounds.min;
         let axis = (0..3).fold(0, |longest, axis| if size[axis] > size[longest] { axis } else { longest });
-        if photons.len() <= MOST || size[axis] == 0.0 {
+        if chosen.len() <= MOST || size[axis] == 0.0 {
             self.nodes.push(Node::Cell(self.cells.len() as u32));
-            self.cell(bounds, photons);
+            // Sums to come are taken in the order of their numbers, which does not depend on how they were divided.
+            chosen.sort_unstable();
+            self.cell(bounds, chosen.iter().map(|&number| photons[number as usize]).collect());
             return;
         }
-        // Sorted as a whole, in an order that does not depend on how: sums to come are taken in it.
-        photons.sort_by(|a, b| a.point[axis].total_cmp(&b.point[axis]));
+        let along = |number: u32| point(number)[axis];
+        let (_, &mut median, _) = chosen.select_nth_unstable_by(chosen.len() / 2, |&a, &b| along(a).total_cmp(&along(b)));
         // Many may lie in one plane: all of these go to the same side.
-        let mut place = photons[photons.len() / 2].point[axis];
-        let mut middle = photons.partition_point(|photon| photon.point[axis] < place);
-        if middle == 0 {
-            middle = photons.partition_point(|photon| photon.point[axis] <= place);
-            place = photons[middle].point[axis];
-        }
+        let beyond = |number: u32| if along(number) > bounds.min[axis] { along(number) } else { f64::INFINITY };
+        let place = if along(median) > bounds.min[axis] {
+            along(median)
+        } else {
+            chosen.iter().map(|&number| beyond(number)).fold(f64::INFINITY, f64::min)
+        };
+        let middle = partition(chosen, |number| along(number) < place);
         let at = self.nodes.len();
         self.nodes.push(Node::Split { place, axis: axis as u32, above: 0 });
-        let (below, above) = photons.split_at_mut(middle);
-        self.divide(below);
+        let (below, above) = chosen.split_at_mut(middle);
+        self.divide(photons, below);
         self.nodes[at] = Node::Split { place, axis: axis as u32, above: self.nodes.len() as u32 };
-        self.divide(above);
+        self.divide(photons, above);
     }
 
     /// Puts the brilliance of all cells in proportion to that of the middle one.
@@ -143,7 +147,7 @@ impl Caustics {
     }
 
     /// Adds a cell of photons within these bounds.
-    fn cell(&mut self, bounds: Bounds, photons: &mut [Photon]) {
+    fn cell(&mut self, bounds: Bounds, mut photons: Vec<Photon>) {
         let (middle, size) = ((bounds.min + bounds.max) * 0.5, bounds.max - bounds.min);
         // Two sides of a box that is flat.
         let area = (size.x * size.y).max(size.y * size.z).max(size.z * size.x);
@@ -151,7 +155,7 @@ impl Caustics {
         let bounds = Bounds { min: bounds.min - margin, max: bounds.max + margin };
         // A point within the cell must be nearer to its middle than where rays come together.
         let most = 0.5 / (bounds.max - middle).length().max(f64::MIN_POSITIVE);
-        let (first, total, mut up_to) = (self.beams.len(), flux(photons), 0.0);
+        let (first, total, mut up_to) = (self.beams.len(), flux(&photons), 0.0);
         let count = photons.len() as u32;
         photons.sort_by_key(|photon| photon.caster);
         let beams = photons.chunk_by(|a, b| a.caster == b.caster);
@@ -248,6 +252,18 @@ impl Region<'_> {
         let (place, evenly) = unfolded(of_middle);
         beam.share * self.lobes.pdf(beam.lobes, place) * evenly * factor
     }
+}
+
+/// Puts those first that are `first`; returns how many they are.
+fn partition(all: &mut [u32], first: impl Fn(u32) -> bool) -> usize {
+    let mut count = 0;
+    for at in 0..all.len() {
+        if first(all[at]) {
+            all.swap(count, at);
+            count += 1;
+        }
+    }
+    count
 }
 
 fn flux(photons: &[Photon]) -> f64 {

@@ -305,24 +305,30 @@ fn denser<const K: usize>(rows: Vec<[[f64; K]; NODES]>) -> Vec<[[f64; K]; NODES]
     (0..(rows.len() - 1) * EVERY + 1).map(between).collect()
 }
 
-fn row<const K: usize, F: Fill<K>>(ggx: &Ggx, azimuth: DVec2, fill: &F) -> [[f64; K]; NODES] {
+fn row<const K: usize, F: Fill<K> + Sync>(ggx: &Ggx, azimuth: DVec2, fill: &F) -> [[f64; K]; NODES] {
     let alpha = (ggx.alpha() * azimuth).length();
     let value = |node: usize| {
         let cos = cosine_at(alpha, grid(node, NODES), fill.bend());
         let sin = (1.0 - cos * cos).max(0.0).sqrt();
         fill.value(ggx, DVec3::new(azimuth.x * sin, azimuth.y * sin, cos))
     };
-    let mut row = [[0.0; K]; NODES];
-    row[0] = value(0);
-    for high in (STRIDE..NODES).step_by(STRIDE) {
-        row[high] = value(high);
-        refine(&mut row, high - STRIDE, high, fill.bend().is_some(), &value);
-    }
-    row
+    // By all threads of the pool: one row may be all that is asked for.
+    let ends: Vec<[f64; K]> = (0..=NODES / STRIDE).into_par_iter().map(|end| value(end * STRIDE)).collect();
+    let piece = |number: usize| {
+        let mut piece = [[0.0; K]; STRIDE + 1];
+        (piece[0], piece[STRIDE]) = (ends[number], ends[number + 1]);
+        refine(&mut piece, 0, STRIDE, number == 0 || fill.bend().is_some(), &|node| value(number * STRIDE + node));
+        piece
+    };
+    let pieces: Vec<_> = (0..NODES / STRIDE).into_par_iter().map(piece).collect();
+    std::array::from_fn(|node| match node / STRIDE {
+        number if number < pieces.len() => pieces[number][node % STRIDE],
+        _ => ends[node / STRIDE],
+    })
 }
 
 /// Fills a row between two nodes, of which there is a power of two; `all` of them, or where functions bend.
-fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, all: bool, value: &impl Fn(usize) -> [f64; K]) {
+fn refine<const K: usize>(row: &mut [[f64; K]; STRIDE + 1], low: usize, high: usize, all: bool, value: &impl Fn(usize) -> [f64; K]) {
     let half = (high - low) / 2;
     if half == 0 {
         return;
@@ -330,7 +336,7 @@ fn refine<const K: usize>(row: &mut [[f64; K]; NODES], low: usize, high: usize, 
     let (a, middle, b) = (row[low], value(low + half), row[high]);
     row[low + half] = middle;
     let bend: [f64; K] = std::array::from_fn(|k| 0.5 * (a[k] + b[k]) - middle[k]);
-    if all || low < STRIDE || bend.iter().any(|bend| bend.abs() > STRAIGHT) {
+    if all || bend.iter().any(|bend| bend.abs() > STRAIGHT) {
         refine(row, low, low + half, all, value);
         refine(row, low + half, high, all, value);
         return;

@@ -65,7 +65,7 @@ fn photons(beyond: f64) -> Vec<Photon> {
 fn directions_are_proposed_as_often_as_the_density_says() {
     for beyond in [5.0, 1e6, -3.0] {
         let photons = photons(beyond);
-        let caustics = Caustics::new(photons.clone());
+        let caustics = Caustics::new(&photons);
         for point in [DVec3::new(0.1, 0.0, 0.3), DVec3::new(0.26, 0.0, 0.24), DVec3::new(0.4, 0.01, 0.45)] {
             let region = caustics.at(point).unwrap();
             // All there are, and those of half the sphere.
@@ -95,13 +95,13 @@ fn directions_are_proposed_as_often_as_the_density_says() {
 
 #[test]
 fn nothing_is_proposed_where_no_light_was_gathered() {
-    let caustics = Caustics::new(photons(5.0));
+    let caustics = Caustics::new(&photons(5.0));
     assert!(caustics.at(DVec3::new(0.2, 1.0, 0.2)).is_none());
     assert!(caustics.at(DVec3::new(3.0, 0.0, 0.2)).is_none());
-    assert!(Caustics::new(Vec::new()).at(DVec3::ZERO).is_none());
+    assert!(Caustics::new(&[]).at(DVec3::ZERO).is_none());
     // All at one point.
     let one = Photon { point: DVec3::ONE, ..photons(5.0)[0] };
-    assert!(Caustics::new(vec![one; 1000]).at(DVec3::ONE).is_some());
+    assert!(Caustics::new(&[one; 1000]).at(DVec3::ONE).is_some());
 }
 
 /// Nine tenths of all light fall on a quarter of the floor; a little falls on one point beside it, of which nothing is known.
@@ -112,7 +112,8 @@ fn regions_know_how_bright_they_are_in_proportion_to_others() {
         Photon { point: DVec3::new(x, 0.0, u.y), flux: 1.0, ..photons(5.0)[0] }
     };
     let beside = Photon { point: DVec3::new(9.0, 0.0, 0.0), flux: 1e-9, ..photons(5.0)[0] };
-    let caustics = Caustics::new(numbers(1 << 14).map(spread).chain(std::iter::repeat_n(beside, 1000)).collect());
+    let all: Vec<Photon> = numbers(1 << 14).map(spread).chain(std::iter::repeat_n(beside, 1000)).collect();
+    let caustics = Caustics::new(&all);
     let mean = |from: f64| {
         let at = |u: f64| caustics.at(DVec3::new(from + u * 0.2, 0.0, 0.5)).unwrap().brilliance();
         (1..8).map(|i| at(f64::from(i) / 8.0)).sum::<f64>() / 7.0
