@@ -150,6 +150,38 @@ fn a_client_that_waits_gets_its_files_though_the_coordinator_was_away() {
     assert!(fs::read(rig.program.path("out/job.exr")).unwrap() == undisturbed(BINARY));
 }
 
+/// A coordinator that has lost its folder gives the number to another job: its files are not those that were asked for.
+#[test]
+fn a_client_that_waits_takes_no_other_job_of_the_same_number_for_its_own() {
+    let mut rig = Rig::new(BINARY, &["attic"], 10);
+    let arguments = ["render", "job.lua", "--set", SAMPLES, "-o", "out", "--coordinator", &rig.address, "--keys", "keys"];
+    let client = rig.program.start(&arguments);
+    rig.wait_for_parts(0);
+    rig.kill_coordinator();
+    // Moments of submission are told in seconds.
+    thread::sleep(Duration::from_secs(2));
+    fs::remove_dir_all(rig.program.path("data")).unwrap();
+    rig.restart_coordinator();
+    assert_eq!(rig.submit(&[]), "1");
+    rig.start("attic");
+    let done = client.finish();
+    assert_eq!(done.code, Some(5), "{}", done.errors);
+    assert!(done.errors.contains("does not have job 1 (job) any more"), "{}", done.errors);
+    assert!(!rig.program.path("out/job.exr").exists());
+}
+
+#[test]
+fn a_client_that_is_interrupted_says_that_the_farm_goes_on() {
+    let rig = Rig::new(BINARY, &["attic"], 11);
+    let client = rig.program.start(&["render", "job.lua", "-o", "out", "--coordinator", &rig.address, "--keys", "keys"]);
+    rig.wait_for_parts(0);
+    thread::sleep(Duration::from_millis(300));
+    signal(client.pid(), Signal::INT);
+    let done = client.finish();
+    assert_eq!(done.code, Some(130), "{}", done.errors);
+    assert!(done.errors.contains("the farm goes on with it; `tessera cancel 1` ends that"), "{}", done.errors);
+}
+
 #[test]
 fn fourteen_of_fifteen_nodes_die_then_all_then_some_come_back() {
     let names: Vec<String> = (1..=15).map(|number| format!("node-{number}")).collect();

@@ -1,9 +1,11 @@
 //! A client's connection to a coordinator.
 
 use std::{
+    collections::BTreeMap,
     fs,
     io::Write,
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
 };
 
 use quinn::{RecvStream, SendStream};
@@ -15,7 +17,7 @@ use crate::{
     error::{Error, ExitCode, Result},
     farm::JobId,
     job::JobDescription,
-    limits::{FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES},
+    limits::{FILE_BYTES, READ_CHUNK_BYTES, REQUEST_BYTES, RESPONSE_BYTES, SUBMISSIONS},
     wire::{self, FileHeader, JobState, KeptJob, Place, Request, Response, Status, Terms, tls::Identity},
 };
 
@@ -98,6 +100,8 @@ fn job_range(text: &str) -> Result<(u64, u64), String> {
 /// A connection to a coordinator.
 pub struct Client {
     link: Link,
+    /// Names and moments of submission of jobs.
+    known: Mutex<BTreeMap<JobId, (String, u64)>>,
     /// Where the coordinator has its assets, if that is known and this machine's.
     assets: Option<PathBuf>,
 }
@@ -111,7 +115,7 @@ impl Client {
         if let Some(warning) = identity.warning() {
             eprintln!("warning: {warning}");
         }
-        Ok(Self { link: Link::new(address, identity).await?, assets: None })
+        Ok(Self { link: Link::new(address, identity).await?, known: Mutex::default(), assets: None })
     }
 
     /// Puts assets into this folder, where its coordinator has its own: what is there need not be sent.
@@ -122,6 +126,30 @@ impl Client {
     /// Ends the connection.
     pub async fn close(&self) {
         self.link.close().await;
+    }
+
+    /// Submits a job, a few times if the coordinator goes away and comes back meanwhile, and returns its number.
+    ///
+    /// # Errors
+    /// When the coordinator refuses the job or is lost for long.
+    pub async fn submit_patiently(
+        &self,
+        description: &JobDescription,
+        assets: &MemoryAssets,
+        terms: &Terms,
+        progress: &Progress,
+    ) -> Result<JobId> {
+        for _ in 1..SUBMISSIONS {
+            match self.submit(description, assets, terms).await {
+                Err(error) if self.assets.is_none() && self.link.is_down() => {
+                    self.link
+                        .restore("to submit the job again (`tessera list` shows whether it was taken already)", error, progress)
+                        .await?;
+                }
+                done => return done,
+            }
+        }
+        self.submit(description, assets, terms).await
     }
 
     /// Submits a job with the assets that the coordinator does not have, and returns its number.
@@ -150,7 +178,13 @@ impl Client {
             },
         };
         match answer? {
-            Response::Submitted { job } => Ok(job),
+            Response::Submitted { job } => {
+                if self.assets.is_none() {
+                    // If it is lost now, the job is taken all the same.
+                    let _ = self.recognise(job).await;
+                }
+                Ok(job)
+            }
             other => Err(self.unexpected(&other)),
         }
     }
@@ -190,13 +224,59 @@ impl Client {
 
     /// Asks something about a job, and again each time that the coordinator has gone away and come back: the job outlives that.
     async fn persist<T>(&self, job: JobId, progress: &mut Progress, mut ask: impl AsyncFnMut(&mut Progress) -> Result<T>) -> Result<T> {
+        // One in this process does not come back.
+        if self.assets.is_some() {
+            return ask(progress).await;
+        }
+        let mut is_sure = self.known(job).is_some();
         loop {
-            match ask(progress).await {
-                // One in this process does not come back.
-                Err(error) if self.assets.is_none() && self.link.is_down() => self.link.restore(job, &error, progress).await?,
+            let asked = async {
+                if !is_sure {
+                    self.recognise(job).await?;
+                }
+                ask(progress).await
+            };
+            match asked.await {
+                Err(error) if self.link.is_down() => {
+                    let what = format!("with job {}", job.0);
+                    self.link.restore(&what, error, progress).await.map_err(|error| going_on(error, job, job))?;
+                    is_sure = false;
+                }
                 done => return done,
             }
         }
+    }
+
+    /// A job's name and moment of submission.
+    fn known(&self, job: JobId) -> Option<(String, u64)> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&job).cloned()
+    }
+
+    /// Sees that the coordinator has the job that it had before: one whose folder is another one gives the same numbers to others.
+    async fn recognise(&self, job: JobId) -> Result<()> {
+        let (known, kept) = (self.known(job), self.list().await);
+        // Where there is nothing to compare with, there is nothing to miss.
+        let found = match kept {
+            Err(_) if known.is_none() && !self.link.is_down() => return Ok(()),
+            kept => kept?.into_iter().find(|kept| kept.job == job).map(|kept| (kept.name, kept.submitted)),
+        };
+        match (known, found) {
+            (None, Some(found)) => {
+                self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(job, found);
+                Ok(())
+            }
+            (Some(known), found) if found.as_ref() != Some(&known) => {
+                let message = format!("the coordinator at {} does not have job {} ({}) any more", self.link.address(), job.0, known.0);
+                Err(Error::new(ExitCode::Farm, message)
+                    .with_help("it was deleted, or the coordinator's folder is another one; `tessera list` shows what there is"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether somebody has waited in vain for the coordinator to come back.
+    pub fn has_given_up(&self) -> bool {
+        self.link.has_given_up()
     }
 
     /// Fetches a job's files into a folder. They take their names when all are there.
@@ -344,6 +424,18 @@ impl Client {
             _ => Error::new(ExitCode::Farm, format!("the coordinator at {} answers something else", self.link.address())),
         }
     }
+}
+
+/// An error of who waited in vain for a coordinator, with what can be done for jobs, from the first to the last, when it is back.
+pub fn going_on(error: Error, first: JobId, last: JobId) -> Error {
+    if error.code == ExitCode::Denied {
+        return error;
+    }
+    let (range, number) =
+        if first == last { (String::new(), first.0.to_string()) } else { (format!(" {} to {}", first.0, last.0), "JOB".to_owned()) };
+    error.with_help(format!(
+        "when it is back, `tessera watch {number}` follows what is left{range}, and `tessera fetch {number}` brings its files"
+    ))
 }
 
 fn unwritable(path: &Path, error: &std::io::Error) -> Error {

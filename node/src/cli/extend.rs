@@ -52,7 +52,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
     progress.say(&format!("{}: has {} of {} samples", description.output.exr, extension.samples, description.frame.quality.samples));
     let mut files = Vec::new();
     while let Some(step) = extension.step() {
-        let job = client.submit(&step, &assets, &terms).await?;
+        let job = client.submit_patiently(&step, &assets, &terms, &progress).await?;
         progress.submitted(job.0);
         let begun = Submitted::alone(job, &step);
         let parts = tempfile::Builder::new()

@@ -2,7 +2,10 @@
 
 use std::{
     net::{SocketAddr, ToSocketAddrs},
-    sync::{Mutex, PoisonError},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
     time::Instant,
 };
 
@@ -12,7 +15,6 @@ use tokio::time::{sleep, timeout};
 use super::progress::Progress;
 use crate::{
     error::{Error, ExitCode, Result},
-    farm::JobId,
     limits::{CONNECT_TIMEOUT, FAREWELL, RETURN_PATIENCE, RETURN_PAUSE, SILENCE_SAID_AFTER},
     wire::{self, Refusal, tls::Identity},
 };
@@ -22,6 +24,7 @@ pub struct Link {
     endpoint: Endpoint,
     address: String,
     connection: Mutex<Connection>,
+    given_up: AtomicBool,
 }
 
 impl Link {
@@ -33,7 +36,7 @@ impl Link {
         let refused = |refusal| unreachable(address, refusal);
         let endpoint = wire::client(identity, resolve(address).map_err(|error| refused(Refusal::other(error)))?)?;
         let connection = patiently(address, dial(&endpoint, address)).await.map_err(refused)?;
-        Ok(Self { endpoint, address: address.to_owned(), connection: Mutex::new(connection) })
+        Ok(Self { endpoint, address: address.to_owned(), connection: Mutex::new(connection), given_up: AtomicBool::new(false) })
     }
 
     /// Where the coordinator is.
@@ -60,12 +63,15 @@ impl Link {
         self.connection().close_reason().is_some_and(|reason| !wire::explain(&reason).denied)
     }
 
-    /// Waits for a coordinator that went away, and says so.
+    /// Waits for a coordinator that went away, and says so, and for what: once. Who has waited in vain does not wait again.
     ///
     /// # Errors
-    /// When it does not come back for a long time, or refuses who asks: with what can be done for the job then.
-    pub async fn restore(&self, job: JobId, error: &Error, progress: &Progress) -> Result<()> {
-        progress.say(&format!("{}; waiting for it to come back with job {}", error.message, job.0));
+    /// When it does not come back for a long time, or refuses who asks.
+    pub async fn restore(&self, what: &str, error: Error, progress: &Progress) -> Result<()> {
+        if self.has_given_up() {
+            return Err(error);
+        }
+        progress.say(&format!("{}; waiting for it to come back {what}", error.message));
         let end = Instant::now() + RETURN_PATIENCE;
         loop {
             match dial(&self.endpoint, &self.address).await {
@@ -76,13 +82,17 @@ impl Link {
                 }
                 // Where there is help, waiting is none: it is another version now, or does not take this key.
                 Err(refusal) if refusal.denied || refusal.help.is_some() || Instant::now() >= end => {
-                    let help =
-                        format!("`tessera watch {0}` follows the job when it is back, and `tessera fetch {0}` brings its files", job.0);
-                    return Err(unreachable(&self.address, refusal).with_help(help));
+                    self.given_up.store(true, Ordering::Relaxed);
+                    return Err(unreachable(&self.address, refusal));
                 }
                 Err(_) => sleep(RETURN_PAUSE).await,
             }
         }
+    }
+
+    /// Whether somebody has waited in vain.
+    pub fn has_given_up(&self) -> bool {
+        self.given_up.load(Ordering::Relaxed)
     }
 
     /// Ends the connection.
@@ -112,9 +122,15 @@ async fn patiently<T>(address: &str, connecting: impl Future<Output = T>) -> T {
 
 /// No connection, and why.
 pub fn unreachable(address: &str, refusal: Refusal) -> Error {
-    let (code, what) = if refusal.denied { (ExitCode::Denied, "refused at") } else { (ExitCode::Farm, "cannot reach the coordinator at") };
-    Error::new(code, format!("{what} {address}: {}", refusal.message))
-        .with_help(refusal.help.unwrap_or("check the address, that the coordinator runs, and that the keys are of its farm"))
+    let (code, what, help) = match refusal.denied {
+        true => (ExitCode::Denied, "refused at", "ask who keeps the farm's keys for another one (tessera keys issue)"),
+        false => (
+            ExitCode::Farm,
+            "cannot reach the coordinator at",
+            "check the address, that the coordinator runs, and that the keys are of its farm",
+        ),
+    };
+    Error::new(code, format!("{what} {address}: {}", refusal.message)).with_help(refusal.help.unwrap_or(help))
 }
 
 /// The address of a host and port.

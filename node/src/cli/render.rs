@@ -91,9 +91,10 @@ pub fn run(args: Args) -> Result<()> {
 async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
     let keys = args.keys.as_deref().ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
     let client = Client::connect(address, &Identity::load_client(keys)?).await?;
-    let done = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1), true).await;
+    // Whoever is interrupted goes at once, with what there is to say.
+    submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1), true).await?;
     client.close().await;
-    done
+    Ok(())
 }
 
 async fn here(args: &Args, folder: &Path) -> Result<()> {
@@ -147,7 +148,7 @@ async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_
         description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
         progress.submitted(submitted.job.0);
     };
-    let (jobs, submitted) = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), taken).await;
+    let (jobs, submitted) = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), &progress, taken).await;
     tokio::select! {
         // The frames before one that fails are pictures all the same.
         done = sequence::follow(client, &jobs, args.show, &args.output) => submitted.and(done),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use tessera_engine::scene::Unbuilt;
 
 use super::{
-    client::Client,
-    progress::Show,
+    client::{self, Client},
+    progress::{Progress, Show},
     render::{outcome, report},
     script::Script,
 };
@@ -54,10 +54,11 @@ pub async fn submit(
     script: &Script,
     first: LoadedJob,
     terms: Terms,
+    progress: &Progress,
     mut taken: impl FnMut(&Submitted, &JobDescription),
 ) -> (Vec<Submitted>, Result<()>) {
     let mut all = Vec::new();
-    let done = submit_each(client, script, first, terms, &mut all, &mut taken).await;
+    let done = submit_each(client, script, first, terms, progress, &mut all, &mut taken).await;
     (all, done)
 }
 
@@ -66,6 +67,7 @@ async fn submit_each(
     script: &Script,
     first: LoadedJob,
     mut terms: Terms,
+    progress: &Progress,
     all: &mut Vec<Submitted>,
     taken: &mut impl FnMut(&Submitted, &JobDescription),
 ) -> Result<()> {
@@ -73,7 +75,7 @@ async fn submit_each(
     let mut rest = sequence.into_iter().flat_map(|frames| frames.numbers()).skip(1);
     let mut next = Some(first);
     while let Some(loaded) = next.take() {
-        let job = client.submit(&loaded.description, &loaded.assets, &terms).await?;
+        let job = client.submit_patiently(&loaded.description, &loaded.assets, &terms, progress).await?;
         let LoadedJob { description, frames, .. } = loaded;
         let frame = frames.map(|(frame, _)| frame).filter(|_| sequence.is_some());
         let submitted = Submitted { job, frame, manifest: description.output.manifest.clone(), warnings: description.warnings.clone() };
@@ -115,7 +117,11 @@ pub async fn follow(client: &Client, jobs: &[Submitted], show: Show, output: &Pa
             if jobs.len() > 1 && !show.quiet {
                 eprintln!("{}error: {error}", of.label());
             }
-            failed.get_or_insert(error);
+            let last = jobs.last().map_or(of.job, |last| last.job);
+            failed.get_or_insert(if client.has_given_up() { client::going_on(error, of.job, last) } else { error });
+        }
+        if client.has_given_up() {
+            break;
         }
     }
     failed.map_or(Ok(()), Err)

@@ -53,7 +53,8 @@ pub fn run(args: Args) -> Result<()> {
                 println!("{}", submitted.job.0);
             }
         };
-        let (jobs, submitted) = sequence::submit(&client, &args.script, loaded, args.standing.terms(args.min_nodes), taken).await;
+        let (jobs, submitted) =
+            sequence::submit(&client, &args.script, loaded, args.standing.terms(args.min_nodes), &progress, taken).await;
         let done = match args.wait {
             true => submitted.and(sequence::follow(&client, &jobs, args.show, &args.output).await),
             false => submitted.map_err(|error| sequence::going_on(error, &jobs)),

@@ -36,8 +36,8 @@ impl Asked {
         let mut answers = |question| self.0.remove(&(node, question));
         match message {
             FromNode::Proof { .. } => answers(Question::Prove),
-            // A node that has lost its scene says so when it is to probe it.
-            FromNode::Prepared { job, .. } => answers(Question::Prepare(*job)) || answers(Question::Probe(*job)),
+            // A node that has lost its scene says so when it is to probe it. One that has it says so twice if it was asked twice.
+            FromNode::Prepared { job, result } => answers(Question::Prepare(*job)) || (result.is_err() && answers(Question::Probe(*job))),
             FromNode::Probed { job, .. } => answers(Question::Probe(*job)),
             _ => true,
         }
@@ -51,5 +51,26 @@ impl Asked {
     /// A job is over.
     pub fn forget_job(&mut self, job: JobId) {
         self.0.retain(|(_, question)| !matches!(question, Question::Prepare(other) | Question::Probe(other) if *other == job));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A renewed connection repeats what was asked, and both are answered: the second answer is none to what was asked since.
+    #[test]
+    fn what_is_asked_twice_and_answered_twice_leaves_later_questions_open() {
+        let (mut asked, node, job) = (Asked::default(), NodeId(0), JobId(5));
+        let prepare = ToNode::Prepare { job, frame: tessera_engine::description::AssetId::of(b"frame"), assets: Vec::new() };
+        let (prepared, lost) = (FromNode::Prepared { job, result: Ok(()) }, FromNode::Prepared { job, result: Err("gone".into()) });
+        (asked.note(node, &prepare), asked.note(node, &prepare));
+        assert!(asked.settles(node, &prepared));
+        asked.note(node, &ToNode::Probe { job, cells: Vec::new(), stride: 1 });
+        assert!(!asked.settles(node, &prepared));
+        assert!(asked.settles(node, &FromNode::Probed { job, cells: Vec::new() }));
+        assert!(!asked.settles(node, &FromNode::Probed { job, cells: Vec::new() }));
+        asked.note(node, &ToNode::Probe { job, cells: Vec::new(), stride: 1 });
+        assert!(asked.settles(node, &lost));
     }
 }

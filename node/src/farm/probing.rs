@@ -94,6 +94,19 @@ impl Job {
         }
     }
 
+    /// A node's connection was renewed, which may have swallowed its answer: what it has not answered is asked once more.
+    pub(super) fn probe_again(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId) {
+        match &self.phase {
+            Phase::Probing(Probing { cells, outstanding, .. }) if outstanding.contains_key(&id) => {
+                let share: Vec<u32> = outstanding.get(&id).into_iter().flatten().copied().collect();
+                if let Some(node) = nodes.get(&id).filter(|_| !share.is_empty()) {
+                    turn.send(id, node, probe_message(self.id, cells, &share));
+                }
+            }
+            _ => self.probe_latecomer(turn, nodes, id),
+        }
+    }
+
     /// Cells that no node has measured, or is about to.
     fn unmeasured(&self) -> Vec<u32> {
         let Phase::Probing(probing) = &self.phase else { return Vec::new() };

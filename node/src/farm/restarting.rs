@@ -63,7 +63,7 @@ impl Job {
         let (Some(member), Some(node)) = (self.members.get(&id), nodes.get(&id)) else { return };
         match member.stage {
             Stage::Preparing(_) => turn.send(id, node, ToNode::Prepare { job: self.id }),
-            Stage::Prepared => self.probe_latecomer(turn, nodes, id),
+            Stage::Prepared => self.probe_again(turn, nodes, id),
             _ => {}
         }
         let Some(node) = nodes.get(&id) else { return };

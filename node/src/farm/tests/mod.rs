@@ -231,6 +231,35 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
     }
 }
 
+/// All of it, not only what every node that comes late is asked.
+#[test]
+fn a_probe_whose_answer_a_broken_connection_swallowed_is_asked_again() {
+    let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
+    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
+    let spec = JobSpec { probe: Probe::EveryNode { scale: 8 }, ..spec(Assign::Paper, 1) };
+    bench.does(Event::JobSubmitted { job: JOB, spec });
+    bench.ready(0, 1);
+    bench.prepared(0, 1);
+    let asked = |bench: &Bench| -> Vec<u32> {
+        let cells = |command: &Command| match command {
+            Command::Send { message: ToNode::Probe { cells, .. }, .. } => Some(cells.iter().map(|(cell, _)| *cell).collect()),
+            _ => None,
+        };
+        bench.said.iter().find_map(cells).unwrap_or_default()
+    };
+    let first = asked(&bench);
+    assert!(first.len() > 1, "{first:?}");
+    let info = || NodeInfo { name: "n0".into(), lanes: 1, build: "b".into(), address: "elsewhere".into() };
+    bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info: info() });
+    assert_eq!(asked(&bench), first);
+    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
+    bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info: info() });
+    assert_eq!(asked(&bench), first);
+    let cells = first.iter().map(|cell| (*cell, 0.01)).collect();
+    bench.does(Event::Probed { node: NodeId(0), incarnation: Incarnation(1), job: JOB, cells });
+    assert_eq!(bench.count(EventKind::ProbeFinished), 1);
+}
+
 /// Two nodes are asked for, the prepared one dies while the other one still compiles: nothing is due before that one answers.
 #[test]
 fn a_prepared_node_that_dies_takes_its_deadline_with_it() {
