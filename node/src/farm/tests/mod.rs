@@ -236,7 +236,7 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
 fn a_probe_whose_answer_a_broken_connection_swallowed_is_asked_again() {
     let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
     bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
-    let spec = JobSpec { probe: Probe::EveryNode { scale: 8 }, ..spec(Assign::Paper, 1) };
+    let spec = JobSpec { probe: Probe::EveryNode { scale: 0.25 }, ..spec(Assign::Paper, 1) };
     bench.does(Event::JobSubmitted { job: JOB, spec });
     bench.ready(0, 1);
     bench.prepared(0, 1);
