@@ -38,14 +38,16 @@ fn mark(path: &Path) -> Mark {
     Some((metadata.modified().ok()?, metadata.len()))
 }
 
-/// Reads the list again when it changes, for ever. A list that has gone, or cannot be read, leaves the last one in force.
+/// Reads the list again when it has changed and lies still, for ever: one that is half written may lack what it is to hold, and would let somebody in. A list that has gone, or cannot
+/// be read, leaves the last one in force.
 pub async fn follow(path: PathBuf, list: watch::Sender<Arc<Revocations>>) {
-    let mut known = None;
+    let (mut known, mut seen) = (None, None);
     let mut tick = interval(REVOCATION_INTERVAL);
     loop {
         tick.tick().await;
         let now = mark(&path);
-        if now == known {
+        let lies_still = std::mem::replace(&mut seen, now) == now;
+        if now == known || !lies_still {
             continue;
         }
         known = now;
