@@ -64,7 +64,8 @@ mod tests {
         let (mut asked, node, job) = (Asked::default(), NodeId(0), JobId(5));
         let prepare = ToNode::Prepare { job, frame: tessera_engine::description::AssetId::of(b"frame"), assets: Vec::new() };
         let (prepared, lost) = (FromNode::Prepared { job, result: Ok(()) }, FromNode::Prepared { job, result: Err("gone".into()) });
-        (asked.note(node, &prepare), asked.note(node, &prepare));
+        asked.note(node, &prepare);
+        asked.note(node, &prepare);
         assert!(asked.settles(node, &prepared));
         asked.note(node, &ToNode::Probe { job, cells: Vec::new(), stride: 1 });
         assert!(!asked.settles(node, &prepared));
