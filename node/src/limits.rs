@@ -58,11 +58,11 @@ pub const SILENCE_SAID_AFTER: Duration = Duration::from_millis(500);
 /// How long a client that follows a job waits for a coordinator that went away: for one that is upgraded, or whose machine starts anew.
 pub const RETURN_PATIENCE: Duration = Duration::from_secs(600);
 
-/// How often a client submits a job whose submission the coordinator did not outlive.
-pub const SUBMISSIONS: u32 = 4;
-
 /// Pauses between its attempts to connect.
 pub const RETURN_PAUSE: Duration = Duration::from_millis(500);
+
+/// How often a client submits a job whose submission the coordinator did not outlive.
+pub const SUBMISSIONS: u32 = 4;
 
 /// Pauses between a node's attempts to connect: from the first, doubling, to the last.
 pub const RECONNECT_PAUSE: (Duration, Duration) = (Duration::from_millis(50), Duration::from_secs(5));

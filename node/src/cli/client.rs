@@ -1,11 +1,11 @@
-//! A client's connection to a coordinator.
+//! What clients ask a coordinator.
 
 use std::{
     collections::BTreeMap,
     fs,
     io::Write,
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, MutexGuard, PoisonError},
 };
 
 use quinn::{RecvStream, SendStream};
@@ -141,10 +141,14 @@ impl Client {
     ) -> Result<JobId> {
         for _ in 1..SUBMISSIONS {
             match self.submit(description, assets, terms).await {
-                Err(error) if self.assets.is_none() && self.link.is_down() => {
+                Err(error) if self.may_return() && self.link.is_down() => {
                     self.link
                         .restore("to submit the job again (`tessera list` shows whether it was taken already)", error, progress)
                         .await?;
+                    let before = self.lock_known().keys().next().copied();
+                    if let Some(job) = before {
+                        self.recognise(job).await?;
+                    }
                 }
                 done => return done,
             }
@@ -179,7 +183,7 @@ impl Client {
         };
         match answer? {
             Response::Submitted { job } => {
-                if self.assets.is_none() {
+                if self.may_return() && self.lock_known().is_empty() {
                     // If it is lost now, the job is taken all the same.
                     let _ = self.recognise(job).await;
                 }
@@ -224,8 +228,7 @@ impl Client {
 
     /// Asks something about a job, and again each time that the coordinator has gone away and come back: the job outlives that.
     async fn persist<T>(&self, job: JobId, progress: &mut Progress, mut ask: impl AsyncFnMut(&mut Progress) -> Result<T>) -> Result<T> {
-        // One in this process does not come back.
-        if self.assets.is_some() {
+        if !self.may_return() {
             return ask(progress).await;
         }
         let mut is_sure = self.known(job).is_some();
@@ -247,9 +250,18 @@ impl Client {
         }
     }
 
+    /// Whether the coordinator may come back once it has gone: one in this process does not.
+    fn may_return(&self) -> bool {
+        self.assets.is_none()
+    }
+
+    fn lock_known(&self) -> MutexGuard<'_, BTreeMap<JobId, (String, u64)>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// A job's name and moment of submission.
     fn known(&self, job: JobId) -> Option<(String, u64)> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner).get(&job).cloned()
+        self.lock_known().get(&job).cloned()
     }
 
     /// Sees that the coordinator has the job that it had before: one whose folder is another one gives the same numbers to others.
@@ -258,19 +270,21 @@ impl Client {
         // Where there is nothing to compare with, there is nothing to miss.
         let found = match kept {
             Err(_) if known.is_none() && !self.link.is_down() => return Ok(()),
-            kept => kept?.into_iter().find(|kept| kept.job == job).map(|kept| (kept.name, kept.submitted)),
+            kept => kept?.into_iter().map(|kept| (kept.job, (kept.name, kept.submitted))).collect::<BTreeMap<_, _>>(),
         };
-        match (known, found) {
-            (None, Some(found)) => {
-                self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(job, found);
+        match known {
+            None => {
+                // All at once: of the frames of a sequence each will be asked for.
+                let mut known = self.lock_known();
+                found.into_iter().for_each(|(job, is)| _ = known.entry(job).or_insert(is));
                 Ok(())
             }
-            (Some(known), found) if found.as_ref() != Some(&known) => {
+            Some(known) if found.get(&job) != Some(&known) => {
                 let message = format!("the coordinator at {} does not have job {} ({}) any more", self.link.address(), job.0, known.0);
                 Err(Error::new(ExitCode::Farm, message)
                     .with_help("it was deleted, or the coordinator's folder is another one; `tessera list` shows what there is"))
             }
-            _ => Ok(()),
+            Some(_) => Ok(()),
         }
     }
 
