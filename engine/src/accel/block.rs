@@ -5,6 +5,7 @@ use std::mem::offset_of;
 use super::{
     frame::{BoxRay, FAR, Normalisation, SHRUNK_AND_GROWN, SMALLEST, largest},
     interleave::WALKERS,
+    node::near_bounds,
     pack::{PackRay, last_axis},
     simd::Lanes,
     told::Told,
@@ -53,6 +54,8 @@ pub struct Group {
     pub negative: [u32; 8],
     error: Eight,
     start: [f64; 8],
+    /// Whether all rays are sound and none started anew.
+    pub is_plain: bool,
 }
 
 /// Where the numbers of a ray stand in [`Block::groups`], beside those of the first: in bytes, so that nothing is computed on the way.
@@ -107,6 +110,12 @@ impl Block {
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.count
+    }
+
+    /// Those of all rays.
+    #[inline(always)]
+    pub fn groups(&self) -> &[Group] {
+        &self.groups[..self.count.div_ceil(8)]
     }
 
     /// Whether a ray may meet anything.
@@ -168,6 +177,12 @@ impl Block {
         unsafe { self.number(offset_of!(Group, limit), place) }
     }
 
+    /// See [`near_bounds`].
+    #[inline(always)]
+    pub fn near(&self, ray: usize) -> [usize; 3] {
+        near_bounds(self.groups[ray / 8].negative[ray % 8])
+    }
+
     /// Sets a parameter of the original ray as its limit; below 0, the ray is done.
     #[inline(always)]
     pub fn set_limit(&mut self, ray: usize, t: f64) {
@@ -187,6 +202,7 @@ impl Group {
         negative: [UNSOUND; 8],
         error: [0.0; 8],
         start: [0.0; 8],
+        is_plain: false,
     };
 
     /// Prepares eight rays of unit direction, but for their limits. Loops over lanes are what compilers turn into vectors.
@@ -199,7 +215,8 @@ impl Group {
                 self.direction[axis][lane] = direction[axis];
             }
         }
-        if self.are_plain() {
+        self.is_plain = self.are_plain();
+        if self.is_plain {
             self.invert();
             self.prepare(filters);
         } else {

@@ -4,7 +4,8 @@ use std::mem::MaybeUninit;
 
 use super::{
     block::Place,
-    node::{LEAF, Node, near_bounds},
+    entry::Entered,
+    node::{LEAF, Node},
     pack::Pack,
     pages::prefetch,
     pending::{Left, Pending},
@@ -20,7 +21,7 @@ pub const WALKERS: usize = 12;
 struct Walker<R> {
     ray: usize,
     at: Place,
-    /// See [`near_bounds`].
+    /// See [`Block::near`](super::block::Block::near).
     near: [usize; 3],
     /// What it visits next.
     current: u32,
@@ -62,9 +63,9 @@ impl<V: Visitor> Stream<'_, V> {
     /// Leads rays of the block, given by their numbers, through the tree.
     ///
     /// # Safety
-    /// The processor has the instructions of `L`. The numbers are below the block's count.
+    /// The processor has the instructions of `L`. The numbers are below the block's count, and those of rays that have entered, if any have.
     #[inline(always)]
-    pub unsafe fn interleave<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, numbers: &[u8]) {
+    pub unsafe fn interleave<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, numbers: &[u8], entered: Option<&Entered<R>>) {
         let mut walkers = [const { MaybeUninit::<Walker<R>>::uninit() }; WALKERS];
         let (mut first, mut second, mut begun) = (Turn::default(), Turn::default(), 0);
         // Turns about, not copied: what was just written byte by byte would have to be waited for.
@@ -80,7 +81,7 @@ impl<V: Visitor> Stream<'_, V> {
                     current: 0,
                     pending: Pending::new(),
                 });
-                self.begin::<R, ANY>(walker, place, numbers, &mut begun);
+                self.begin::<L, R, ANY>(walker, place, numbers, &mut begun, entered);
                 now.note(place as u8, walker.current, self.nodes, self.packs);
             }
             loop {
@@ -90,14 +91,14 @@ impl<V: Visitor> Stream<'_, V> {
                 (turn.inner_count, turn.leaf_count) = (0, 0);
                 for &place in now.inner.get_unchecked(..now.inner_count) {
                     let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
-                    if self.step::<L, R>(walker) || self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun) {
+                    if self.step::<L, R>(walker) || self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun, entered) {
                         turn.note(place, walker.current, self.nodes, self.packs);
                     }
                 }
                 for &place in now.leaf.get_unchecked(..now.leaf_count) {
                     let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
                     self.visit::<L, ANY>(walker.current & !LEAF, walker.ray, place.into());
-                    if self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun) {
+                    if self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun, entered) {
                         turn.note(place, walker.current, self.nodes, self.packs);
                     }
                 }
@@ -122,7 +123,7 @@ impl<V: Visitor> Stream<'_, V> {
             let met = R::of(enter, leave);
             let (_, next) = met.next();
             let rest = met.rest(next);
-            walker.pending.push(walker.current, rest, !rest.is_empty());
+            walker.pending.push(node, rest, !rest.is_empty());
             walker.current = *node.children.get_unchecked(next);
             !met.is_empty()
         }
@@ -139,12 +140,13 @@ impl<V: Visitor> Stream<'_, V> {
         place: usize,
         numbers: &[u8],
         begun: &mut usize,
+        entered: Option<&Entered<R>>,
     ) -> bool {
         // SAFETY: by this function's own condition; the ray is one of the block, and pending are children of this tree's nodes.
         unsafe {
             match walker.pending.pop::<L>(self.block.limit_of(walker.at)) {
-                Some(child) => walker.current = child.reference(self.nodes),
-                None if *begun < numbers.len() => self.begin::<R, ANY>(walker, place, numbers, begun),
+                Some(child) => walker.current = child.reference(),
+                None if *begun < numbers.len() => self.begin::<L, R, ANY>(walker, place, numbers, begun, entered),
                 None => return false,
             }
         }
@@ -152,16 +154,30 @@ impl<V: Visitor> Stream<'_, V> {
     }
 
     /// Gives a walker the next ray.
+    ///
+    /// # Safety
+    /// The processor has the instructions of `L`.
     #[inline(always)]
-    fn begin<R: Copy, const ANY: bool>(&mut self, walker: &mut Walker<R>, place: usize, numbers: &[u8], begun: &mut usize) {
+    unsafe fn begin<L: Lanes, R: Left<L>, const ANY: bool>(
+        &mut self,
+        walker: &mut Walker<R>,
+        place: usize,
+        numbers: &[u8],
+        begun: &mut usize,
+        entered: Option<&Entered<R>>,
+    ) {
         walker.ray = numbers[*begun].into();
         *begun += 1;
         walker.at = Place::of(walker.ray);
-        walker.near = near_bounds(self.block.groups[walker.ray / 8].negative[walker.ray % 8]);
+        walker.near = self.block.near(walker.ray);
         walker.current = self.root;
         walker.pending.clear();
         if ANY {
             self.block.told[place].clear();
+        }
+        if let Some(entered) = entered {
+            // SAFETY: by this function's own condition.
+            walker.current = unsafe { entered.first(walker.ray, &mut walker.pending) };
         }
     }
 }

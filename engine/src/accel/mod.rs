@@ -12,6 +12,7 @@ mod build;
 mod cluster;
 mod collapse;
 mod content;
+mod entry;
 mod frame;
 mod identity;
 mod interleave;

@@ -3,6 +3,7 @@
 
 use super::{
     block::{Eight, Group},
+    entry::Entry,
     interleave::WALKERS,
     node::{LEAF, Node, far_bound, near_bounds},
     pending::{Left, Pending},
@@ -77,7 +78,7 @@ impl Packet {
 
 /// The least and the greatest.
 #[inline(always)]
-fn range(of: &Eight) -> (f32, f32) {
+pub(super) fn range(of: &Eight) -> (f32, f32) {
     let (less, greater) = (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
     let [a, b, c, d, e, f, g, h] = *of;
     (
@@ -92,7 +93,7 @@ impl<V: Visitor> Stream<'_, V> {
     /// # Safety
     /// The processor has the instructions of `L`. The group is one of the block, and full.
     #[inline(always)]
-    pub unsafe fn go_together<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, group: usize) -> bool {
+    pub unsafe fn go_together<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, group: usize, entry: Option<&Entry>) -> bool {
         if self.root & LEAF != 0 {
             return false;
         }
@@ -102,25 +103,25 @@ impl<V: Visitor> Stream<'_, V> {
         }
         let mut pending = Pending::<R>::new();
         let mut limit = range(&self.block.groups[group].limit).1;
-        let mut current = self.root;
+        let mut current: *const Node = entry.map_or(&self.nodes[self.root as usize], |entry| &entry.0);
         // SAFETY: all are nodes and leaves of this tree, which is never deeper than `MAX_DEPTH`.
         unsafe {
             let near_ray = [L::splats(&packet.near_ray[0]), L::splats(&packet.near_ray[1])];
             let far_ray = [L::splats(&packet.far_ray[0]), L::splats(&packet.far_ray[1])];
             while limit >= 0.0 {
-                let (enter, leave) = self.nodes.get_unchecked(current as usize).meet(packet.near, near_ray, far_ray, L::splat(limit));
+                let (enter, leave) = (*current).meet(packet.near, near_ray, far_ray, L::splat(limit));
                 let met = R::of(enter, leave);
                 pending.push(current, met, !met.is_empty());
                 loop {
                     let Some(child) = pending.pop::<L>(limit) else { return true };
-                    let node = self.nodes.get_unchecked(child.node as usize);
+                    let node = &*child.node;
                     let mut met = packet.meets::<L>(self.block.groups.get_unchecked(group), node, child.place);
                     if met == 0 {
                         continue;
                     }
-                    let reference = child.reference(self.nodes);
+                    let reference = child.reference();
                     if reference & LEAF == 0 {
-                        current = reference;
+                        current = self.nodes.get_unchecked(reference as usize);
                         break;
                     }
                     while met != 0 {

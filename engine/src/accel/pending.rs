@@ -81,14 +81,14 @@ impl<L: Lanes> Left<L> for Unordered {
 /// For each node on the way down that has children left to visit: which.
 pub struct Pending<R> {
     left: [MaybeUninit<R>; MAX_DEPTH],
-    nodes: [MaybeUninit<u32>; MAX_DEPTH],
+    nodes: [MaybeUninit<*const Node>; MAX_DEPTH],
     height: usize,
 }
 
 /// A child: the node that it is of, and its place there.
 #[derive(Clone, Copy)]
 pub struct Child {
-    pub node: u32,
+    pub node: *const Node,
     pub place: usize,
 }
 
@@ -110,7 +110,7 @@ impl<R: Copy> Pending<R> {
     /// # Safety
     /// There is place: at most `MAX_DEPTH` nodes are on the way down.
     #[inline(always)]
-    pub unsafe fn push(&mut self, node: u32, left: R, some: bool) {
+    pub unsafe fn push(&mut self, node: *const Node, left: R, some: bool) {
         // SAFETY: by this function's own condition.
         unsafe {
             self.left.get_unchecked_mut(self.height).write(left);
@@ -149,13 +149,13 @@ impl<R: Copy> Pending<R> {
 }
 
 impl Child {
-    /// What a child's reference is.
+    /// What its reference is.
     ///
     /// # Safety
-    /// It is one of these nodes'.
+    /// Its node is there.
     #[inline(always)]
-    pub unsafe fn reference(self, nodes: &[Node]) -> u32 {
+    pub unsafe fn reference(self) -> u32 {
         // SAFETY: by this function's own condition.
-        unsafe { *nodes.get_unchecked(self.node as usize).children.get_unchecked(self.place) }
+        unsafe { *(*self.node).children.get_unchecked(self.place) }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::{
     block::{self, Block},
+    entry::Entry,
     frame::Normalisation,
     node::Node,
     pack::Pack,
@@ -48,20 +49,31 @@ impl<V: Visitor> Stream<'_, V> {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     unsafe fn lead<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, count: usize) {
-        let (mut single, mut singles) = ([0; block::SIZE], 0);
+        // Rays that look for the nearest hit hardly ever end nearby.
+        // SAFETY: by this function's own condition, as below.
+        let entry = if ANY { unsafe { Entry::of::<L>(self.nodes, self.root, self.block) } } else { None };
+        let (mut singles, mut count_of_singles) = ([0; block::SIZE], 0);
         for group in 0..count.div_ceil(8) {
             let numbers = group * 8..count.min(group * 8 + 8);
-            // SAFETY: by this function's own condition.
-            if numbers.len() == 8 && unsafe { self.go_together::<L, R, ANY>(group) } {
+            // SAFETY: see above.
+            if numbers.len() == 8 && unsafe { self.go_together::<L, R, ANY>(group, entry.as_ref()) } {
                 continue;
             }
             for number in numbers.filter(|number| self.block.is_under_way(*number)) {
-                single[singles] = number as u8;
-                singles += 1;
+                singles[count_of_singles] = number as u8;
+                count_of_singles += 1;
             }
         }
-        // SAFETY: by this function's own condition.
-        unsafe { self.interleave::<L, R, ANY>(&single[..singles]) };
+        let singles = &mut singles[..count_of_singles];
+        match entry {
+            // SAFETY: see above.
+            Some(entry) => unsafe {
+                let (entered, singles) = entry.enter::<L, R>(self.block, singles);
+                self.interleave::<L, R, ANY>(singles, Some(&entered));
+            },
+            // SAFETY: see above.
+            None => unsafe { self.interleave::<L, R, ANY>(singles, None) },
+        }
     }
 
     /// Lets a ray meet what is in a leaf. `place` is that of what it was told.
