@@ -206,6 +206,32 @@ fn a_split_triangle_is_crossed_once() {
     assert!(most > 8, "{most}");
 }
 
+/// Short rays that start near one another, of all sizes, some of which end just behind what they meet first.
+#[test]
+fn bundles_of_short_rays_find_what_single_rays_find() {
+    let mut meshes = Maker::default();
+    meshes.mesh(&ball(60, 80, 0.2), placement(&mut Random(3)));
+    meshes.mesh(&ball(30, 20, 0.1), placement(&mut Random(5)));
+    for mut scene in [meshes.compile(), everything(1, 60).compile()] {
+        let (mut random, mut rays) = (Random(23), Vec::new());
+        for seen in rays_of(&scene, 1_500) {
+            let Some(surface) = scene.closest(&seen) else { continue };
+            let size = 10f64.powf(-5.0 * random.unit());
+            for _ in 0..64 {
+                let mut ray = Ray::new(surface.point + random.point() * size, random.direction());
+                ray.t_max = random.unit() * size * 2.0;
+                if random.bits().is_multiple_of(2)
+                    && let Some(met) = scene.closest(&Ray { t_max: size * 2.0, ..ray })
+                {
+                    ray.t_max = met.t.next_up();
+                }
+                rays.push(ray);
+            }
+        }
+        check_streams(&mut scene, &rays);
+    }
+}
+
 /// Rays that go the same way, eight at a time, and those that do not, some of them short, some that are not sound, beside a plane and a sphere.
 #[test]
 fn streams_find_what_single_rays_find() {
