@@ -31,21 +31,23 @@ impl Entry {
         let mut opened = nodes.get(root as usize)?;
         // SAFETY: by this function's own condition, as below.
         let reach = unsafe { Reach::of::<L>(block) }?;
-        let (mut entry, mut count, mut tried) = (Node::EMPTY, 0, 0);
         // SAFETY: see above.
         let mut met = unsafe { reach.overlaps::<L>(opened) };
+        // Of which nodes its children are, and their places there.
+        let (mut children, mut count, mut tried) = ([(opened, 0); 8], 0, 0);
         loop {
             while met != 0 {
-                copy(opened, met.trailing_zeros() as usize, &mut entry, count);
+                children[count] = (opened, met.trailing_zeros() as usize);
                 count += 1;
                 met &= met - 1;
             }
             // The next that has few enough children there gives place to them.
             loop {
                 if tried == count {
-                    return Some(Self(entry));
+                    return Some(Self(node_of(&children[..count])));
                 }
-                if let Some(node) = nodes.get(entry.children[tried] as usize) {
+                let (of, place) = children[tried];
+                if let Some(node) = nodes.get(of.children[place] as usize) {
                     // SAFETY: see above.
                     met = unsafe { reach.overlaps::<L>(node) };
                     if count - 1 + met.count_ones() as usize <= 8 {
@@ -56,9 +58,7 @@ impl Entry {
                 tried += 1;
             }
             count -= 1;
-            let last = entry;
-            copy(&last, count, &mut entry, tried);
-            copy(&Node::EMPTY, 0, &mut entry, count);
+            children[tried] = children[count];
         }
     }
 
@@ -116,13 +116,17 @@ impl<R: Copy> Entered<R> {
     }
 }
 
-/// Copies a child to a place of another node.
+/// A node of children of others, given with their places there.
 #[inline(always)]
-fn copy(from: &Node, place: usize, to: &mut Node, at: usize) {
-    for (from, to) in from.bounds.iter().zip(&mut to.bounds) {
-        to[at] = from[place];
+fn node_of(children: &[(&Node, usize)]) -> Node {
+    let mut made = Node::EMPTY;
+    for (at, &(of, place)) in children.iter().enumerate() {
+        for (from, to) in of.bounds.iter().zip(&mut made.bounds) {
+            to[at] = from[place];
+        }
+        made.children[at] = of.children[place];
     }
-    to.children[at] = from.children[place];
+    made
 }
 
 /// A box around all that the rays of a block may meet.
@@ -174,12 +178,15 @@ impl Reach {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     unsafe fn overlaps<L: Lanes>(&self, node: &Node) -> u32 {
-        (0..3).fold(0xff, |all, axis| {
+        // Not by `fold`, whose own code may be compiled without the instructions of `L`.
+        let mut all = 0xff;
+        for axis in 0..3 {
             // SAFETY: by this function's own condition.
             unsafe {
                 let (lower, upper) = (L::load(&node.bounds[axis]), L::load(&node.bounds[axis + 3]));
-                all & lower.le(L::splat(self.max[axis])) & L::splat(self.min[axis]).le(upper)
+                all &= lower.le(L::splat(self.max[axis])) & L::splat(self.min[axis]).le(upper);
             }
-        })
+        }
+        all
     }
 }
