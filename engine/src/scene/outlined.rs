@@ -10,7 +10,7 @@ use super::{
 use crate::accel::Avx2;
 use crate::{
     accel::{Baseline, Block, Lanes, Pencil, Tree},
-    shape::Ray,
+    shape::{Ray, triangle::TriangleHit},
 };
 
 /// Outlined, so that scenes without meshes do not pay for them in registers, nor what is inside of meshes for what is beside them.
@@ -24,6 +24,7 @@ pub(super) trait Outlined: Lanes {
     unsafe fn any_of_tree(scene: &Scene, tree: &Tree, ray: &Ray, blocked: &mut impl Blocked) -> bool;
     unsafe fn closest_of_leaf(scene: &Scene, ray: &Ray, reference: u32, best: &mut Hit);
     unsafe fn any_of_leaf(scene: &Scene, ray: &Ray, reference: u32, blocked: &mut impl FnMut(Thing, f64) -> bool) -> bool;
+    unsafe fn exact(scene: &Scene, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit>;
     unsafe fn closest_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], best: &mut [Hit]);
     unsafe fn any_of_block(scene: &Scene, tree: &Tree, room: &mut Block, rays: &[Ray], is_blocked: &mut [bool], blocked: &mut impl Blocked);
 }
@@ -100,6 +101,17 @@ macro_rules! outlined {
                 }
                 // SAFETY: see above.
                 unsafe { outlined(scene, ray, reference, blocked) }
+            }
+
+            #[inline(always)]
+            unsafe fn exact(scene: &Scene, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit> {
+                $(#[target_feature(enable = $features)])?
+                #[inline(never)]
+                unsafe fn outlined(scene: &Scene, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit> {
+                    scene.exact_in(ray, instance, triangle)
+                }
+                // SAFETY: see above.
+                unsafe { outlined(scene, ray, instance, triangle) }
             }
 
             #[inline(always)]

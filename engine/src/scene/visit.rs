@@ -38,7 +38,8 @@ impl<L: Outlined> Visitor for Closest<'_, L> {
 
     #[inline(always)]
     fn exact(&self, ray: usize, instance: u32, triangle: u32) -> Option<TriangleHit> {
-        self.scene.exact(&self.rays[ray], instance, triangle)
+        // SAFETY: whoever made this has the instructions of `L`.
+        unsafe { L::exact(self.scene, &self.rays[ray], instance, triangle) }
     }
 
     #[inline(always)]
@@ -104,7 +105,8 @@ impl<L: Outlined, B: Blocked> Visitor for Any<'_, L, B> {
 
     #[inline(always)]
     fn exact(&self, ray: usize, instance: u32, triangle: u32) -> Option<TriangleHit> {
-        self.scene.exact(&self.rays[ray], instance, triangle)
+        // SAFETY: whoever made this has the instructions of `L`.
+        unsafe { L::exact(self.scene, &self.rays[ray], instance, triangle) }
     }
 
     #[inline(always)]
@@ -150,8 +152,8 @@ impl Scene {
     }
 
     /// Where a ray hits a triangle of an instance whose triangles stand in the tree of the world, moved.
-    #[inline(never)]
-    fn exact(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit> {
+    #[inline(always)]
+    pub(super) fn exact_in(&self, ray: &Ray, instance: u32, triangle: u32) -> Option<TriangleHit> {
         let placed = self.instance(instance);
         self.geometry.meshes[placed.shape.mesh as usize].triangles.hit(triangle, &placed.shape.of_ray(ray))
     }
