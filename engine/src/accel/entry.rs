@@ -178,7 +178,7 @@ impl Reach {
     /// The processor has the instructions of `L`.
     #[inline(always)]
     unsafe fn overlaps<L: Lanes>(&self, node: &Node) -> u32 {
-        // Not by `fold`, whose own code may be compiled without the instructions of `L`.
+        // A loop: see `Lanes`.
         let mut all = 0xff;
         for axis in 0..3 {
             // SAFETY: by this function's own condition.

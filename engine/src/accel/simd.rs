@@ -23,11 +23,12 @@ impl Simd {
 /// Eight f32.
 ///
 /// # Safety
-/// Every function needs the instructions of its type; they are inlined into functions that enable them.
+/// Every function needs the instructions of its type; they are inlined into functions that enable them. Closures that are given to functions of the standard library
+/// (`map`, `fold`) may be compiled without these instructions, each of which is then a call: loops instead.
 pub(crate) trait Lanes: Copy {
     unsafe fn load(from: &[f32; 8]) -> Self;
     unsafe fn splat(x: f32) -> Self;
-    /// Each of the first three in all lanes. Not by `array::map`, whose own code may be compiled without the instructions of the type.
+    /// Each of the first three in all lanes.
     #[inline(always)]
     unsafe fn splats<const N: usize>(v: &[f32; N]) -> [Self; 3] {
         // SAFETY: by this function's own condition.
