@@ -173,13 +173,19 @@ fn a_client_that_waits_takes_no_other_job_of_the_same_number_for_its_own() {
 #[test]
 fn a_client_that_is_interrupted_says_that_the_farm_goes_on() {
     let rig = Rig::new(BINARY, &["attic"], 11);
-    let client = rig.program.start(&["render", "job.lua", "-o", "out", "--coordinator", &rig.address, "--keys", "keys"]);
-    rig.wait_for_parts(0);
-    thread::sleep(Duration::from_millis(300));
-    signal(client.pid(), Signal::INT);
-    let done = client.finish();
-    assert_eq!(done.code, Some(130), "{}", done.errors);
-    assert!(done.errors.contains("the farm goes on with it; `tessera cancel 1` ends that"), "{}", done.errors);
+    let farm = ["--coordinator", rig.address.as_str(), "--keys", "keys"];
+    let interrupted = |arguments: &[&str], job: &str| {
+        let client = rig.program.start(&[arguments, &farm].concat());
+        client.wait_for_complaint("preparing: 0 nodes");
+        signal(client.pid(), Signal::INT);
+        let done = client.finish();
+        assert_eq!(done.code, Some(130), "{}", done.errors);
+        let said = format!("the farm goes on with it; `tessera cancel {job}` ends that");
+        assert!(done.errors.contains(&said), "{arguments:?} {}", done.errors);
+    };
+    interrupted(&["render", "job.lua", "-o", "out"], "1");
+    interrupted(&["watch", "1"], "1");
+    interrupted(&["submit", "job.lua", "--wait", "-o", "out"], "2");
 }
 
 #[test]

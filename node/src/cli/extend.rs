@@ -13,6 +13,7 @@ use tessera_engine::{
 
 use super::{
     client::Client,
+    farewell::Farewell,
     progress::Show,
     render::{outcome, report},
     script::Script,
@@ -42,7 +43,15 @@ struct Extension<'a> {
 ///
 /// # Errors
 /// [`ExitCode::Usage`] when the job is none that can be extended, [`ExitCode::File`] when there is no picture of it with fewer samples; those of the jobs.
-pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: Terms, show: Show, folder: &Path) -> Result<()> {
+pub async fn extend(
+    client: &Client,
+    script: &Script,
+    loaded: LoadedJob,
+    terms: Terms,
+    show: Show,
+    folder: &Path,
+    farewell: &Farewell,
+) -> Result<()> {
     if loaded.sequence(&script.parameters()).is_some() {
         return Err(refused("a sequence of frames").with_help("choose one of them with --set frame=NUMBER"));
     }
@@ -54,6 +63,7 @@ pub async fn extend(client: &Client, script: &Script, loaded: LoadedJob, terms: 
     while let Some(step) = extension.step() {
         let job = client.submit_patiently(&step, &assets, &terms, &progress).await?;
         progress.submitted(job.0);
+        farewell.now(job.0);
         let begun = Submitted::alone(job, &step);
         let parts = tempfile::Builder::new()
             .prefix("tessera-")

@@ -11,6 +11,7 @@ mod coordinator;
 mod delete;
 mod direct;
 mod extend;
+mod farewell;
 mod fetch;
 mod here;
 mod join;

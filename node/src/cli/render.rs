@@ -12,10 +12,11 @@ use serde_json::json;
 use super::{
     client::Client,
     direct, extend,
+    farewell::Farewell,
     local::{self, LocalFarm},
     node::cores,
     progress::{Show, event},
-    runtime::{block_on, interrupted, start_logs},
+    runtime::{block_on, block_on_farm, start_logs},
     script::Script,
     sequence::{self, Standing, Submitted, each_frame},
 };
@@ -75,7 +76,8 @@ pub fn run(args: Args) -> Result<()> {
     match (&args.coordinator, args.threads) {
         (Some(address), None) => {
             let (loaded, _) = args.script.load()?;
-            block_on(on_farm(address, &args, loaded))
+            let farewell = Farewell::default();
+            block_on_farm(&farewell, on_farm(address, &args, loaded, &farewell))
         }
         (_, Some(threads)) => each_frame(&args.script, args.script.load()?, |loaded, scene| {
             show_files(args.show, &direct::render(&loaded.description, scene, threads, &args.output, args.show)?)
@@ -88,11 +90,10 @@ pub fn run(args: Args) -> Result<()> {
     }
 }
 
-async fn on_farm(address: &str, args: &Args, loaded: LoadedJob) -> Result<()> {
+async fn on_farm(address: &str, args: &Args, loaded: LoadedJob, farewell: &Farewell) -> Result<()> {
     let keys = args.keys.as_deref().ok_or_else(|| Error::new(ExitCode::Usage, "--keys is missing"))?;
     let client = Client::connect(address, &Identity::load_client(keys)?).await?;
-    // Whoever is interrupted goes at once, with what there is to say.
-    submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1), true).await?;
+    submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(1), farewell).await?;
     client.close().await;
     Ok(())
 }
@@ -101,7 +102,9 @@ async fn here(args: &Args, folder: &Path) -> Result<()> {
     let (loaded, mut local) = loaded_and_started(args, folder).await?;
     local.nodes.iter().for_each(|(name, process)| args.show.progress().started(name, *process));
     let client = local.client().await?;
-    let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes), false);
+    // This farm ends with its client: there is nothing that goes on.
+    let farewell = Farewell::default();
+    let work = submit_and_follow(&client, args, loaded, args.min_nodes.unwrap_or(args.nodes), &farewell);
     tokio::pin!(work);
     let done = loop {
         tokio::select! {
@@ -134,30 +137,22 @@ async fn loaded_and_started(args: &Args, folder: &Path) -> Result<(LoadedJob, Lo
     }
 }
 
-/// Submits what a script says, shows how it fares, fetches its files. Whether jobs go on when the user leaves.
-async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32, go_on: bool) -> Result<()> {
+/// Submits what a script says, shows how it fares, fetches its files.
+async fn submit_and_follow(client: &Client, args: &Args, loaded: LoadedJob, min_nodes: u32, farewell: &Farewell) -> Result<()> {
     if args.extend {
-        let extending = extend::extend(client, &args.script, loaded, args.standing.terms(min_nodes), args.show, &args.output);
-        return tokio::select! {
-            done = extending => done,
-            () = interrupted(), if go_on => Err(Error::new(ExitCode::Interrupted, "interrupted").with_help("the farm goes on with the step under way; `tessera list` and `tessera cancel` end that")),
-        };
+        let terms = args.standing.terms(min_nodes);
+        return extend::extend(client, &args.script, loaded, terms, args.show, &args.output, farewell).await;
     }
     let progress = args.show.progress();
     let taken = |submitted: &Submitted, description: &JobDescription| {
         description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
         progress.submitted(submitted.job.0);
+        farewell.and(submitted.job.0);
     };
     let (jobs, submitted) = sequence::submit(client, &args.script, loaded, args.standing.terms(min_nodes), &progress, taken).await;
-    tokio::select! {
-        // The frames before one that fails are pictures all the same.
-        done = sequence::follow(client, &jobs, args.show, &args.output) => submitted.and(done),
-        () = interrupted(), if go_on => {
-            let numbers: Vec<String> = jobs.iter().map(|job| job.job.0.to_string()).collect();
-            let help = format!("the farm goes on with it; `tessera cancel {}` ends that", numbers.join(" "));
-            Err(Error::new(ExitCode::Interrupted, "interrupted").with_help(help))
-        }
-    }
+    // The frames before one that fails are pictures all the same.
+    let done = sequence::follow(client, &jobs, args.show, &args.output).await;
+    submitted.and(done)
 }
 
 /// A length of time given on the command line.

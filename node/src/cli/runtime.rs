@@ -9,6 +9,7 @@ use tokio::{
 };
 use tracing_subscriber::EnvFilter;
 
+use super::farewell::Farewell;
 use crate::error::{Error, ExitCode, Result};
 
 /// Logs go to stderr, as the environment variable `TESSERA_LOG` says (`warn`, `info`, `tessera_node=debug`, ...).
@@ -40,15 +41,23 @@ pub fn runtime() -> Result<Runtime> {
 /// # Errors
 /// Those of the work; [`ExitCode::Interrupted`] when the user interrupts it: see [`interrupted`].
 pub fn block_on<T>(work: impl Future<Output = Result<T>>) -> Result<T> {
+    block_on_farm(&Farewell::default(), work)
+}
+
+/// The same for work that a farm goes on with: the user is told with what.
+///
+/// # Errors
+/// As those of [`block_on`].
+pub fn block_on_farm<T>(farewell: &Farewell, work: impl Future<Output = Result<T>>) -> Result<T> {
     let runtime = runtime()?;
     let result = runtime.block_on(async {
         // Before the work begins: what it leaves behind must not depend on how soon the signal comes.
         let interrupted = interrupted();
         tokio::select! {
-            // First, as it may know better what is to be said.
+            // First: what is done is done.
             biased;
             result = work => result,
-            () = interrupted => Err(Error::new(ExitCode::Interrupted, "interrupted")),
+            () = interrupted => Err(Error { help: farewell.help(), ..Error::new(ExitCode::Interrupted, "interrupted") }),
         }
     });
     runtime.shutdown_timeout(Duration::from_millis(100));

@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use super::{
     client::Access,
+    farewell::Farewell,
     progress::Show,
     render::check_writable,
-    runtime::{block_on, start_logs},
+    runtime::{block_on_farm, start_logs},
     script::Script,
     sequence::{self, Standing, Submitted},
 };
@@ -43,9 +44,11 @@ pub fn run(args: Args) -> Result<()> {
         check_writable(&args.output)?;
     }
     let progress = args.show.progress();
-    block_on(async {
+    let farewell = Farewell::default();
+    block_on_farm(&farewell, async {
         let client = args.access.connect().await?;
         let taken = |submitted: &Submitted, description: &JobDescription| {
+            farewell.and(submitted.job.0);
             description.warnings.iter().for_each(|warning| progress.say(&format!("warning: {warning}")));
             if args.show.json {
                 progress.submitted(submitted.job.0);

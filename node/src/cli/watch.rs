@@ -2,9 +2,10 @@
 
 use super::{
     client::{Access, job_number},
+    farewell::Farewell,
     progress::Show,
     render::outcome,
-    runtime::{block_on, start_logs},
+    runtime::{block_on_farm, start_logs},
 };
 use crate::{error::Result, farm::JobId};
 
@@ -24,8 +25,10 @@ pub struct Args {
 pub fn run(args: Args) -> Result<()> {
     start_logs("error");
     let mut progress = args.show.progress();
-    let state = block_on(async {
+    let farewell = Farewell::default();
+    let state = block_on_farm(&farewell, async {
         let client = args.access.connect().await?;
+        farewell.and(args.job);
         let state = client.watch(JobId(args.job), &mut progress).await?;
         client.close().await;
         Ok(state)
