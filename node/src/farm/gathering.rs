@@ -55,15 +55,20 @@ impl Job {
         turn.send(id, node, ToNode::Prepare { job: self.id });
     }
 
-    /// A node has compiled the scene, or cannot.
+    /// A node has compiled the scene, or cannot; or it was to probe it, and has it no more.
     pub fn prepared(&mut self, turn: &mut Turn, nodes: &mut Nodes, id: NodeId, result: Result<(), String>) {
-        let Some(member) = self.members.get_mut(&id).filter(|member| matches!(member.stage, Stage::Preparing(_))) else { return };
-        match result {
-            Ok(()) => {
+        let Some(member) = self.members.get_mut(&id) else { return };
+        match (&member.stage, result) {
+            (Stage::Preparing(_), Ok(())) => {
                 member.stage = Stage::Prepared;
                 self.probe_latecomer(turn, nodes, id);
             }
-            Err(reason) => self.leave_out(turn, id, reason),
+            (Stage::Preparing(_), Err(reason)) => self.leave_out(turn, id, reason),
+            (Stage::Prepared, Err(reason)) => {
+                self.leave_out(turn, id, reason);
+                self.probe_without(turn, nodes, id);
+            }
+            _ => {}
         }
     }
 

@@ -1,6 +1,7 @@
 //! Transitions of the state machine, one by one. Whole schedules of faults are the simulator's.
 
 mod failing;
+mod probing;
 mod queue;
 
 use std::collections::BTreeMap;
@@ -229,35 +230,6 @@ fn orders_are_repeated_when_a_connection_is_renewed() {
         assert_eq!(bench.said.iter().filter(|command| again(command)).count(), 2);
         assert_eq!(bench.count(EventKind::Lost), 0);
     }
-}
-
-/// All of it, not only what every node that comes late is asked.
-#[test]
-fn a_probe_whose_answer_a_broken_connection_swallowed_is_asked_again() {
-    let mut bench = Bench { farm: Farm::new(FarmConfig::default()), now: Duration::ZERO, said: Vec::new() };
-    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
-    let spec = JobSpec { probe: Probe::EveryNode { scale: 0.25 }, ..spec(Assign::Paper, 1) };
-    bench.does(Event::JobSubmitted { job: JOB, spec });
-    bench.ready(0, 1);
-    bench.prepared(0, 1);
-    let asked = |bench: &Bench| -> Vec<u32> {
-        let cells = |command: &Command| match command {
-            Command::Send { message: ToNode::Probe { cells, .. }, .. } => Some(cells.iter().map(|(cell, _)| *cell).collect()),
-            _ => None,
-        };
-        bench.said.iter().find_map(cells).unwrap_or_default()
-    };
-    let first = asked(&bench);
-    assert!(first.len() > 1, "{first:?}");
-    let info = || NodeInfo { name: "n0".into(), lanes: 1, build: "b".into(), address: "elsewhere".into() };
-    bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info: info() });
-    assert_eq!(asked(&bench), first);
-    bench.does(Event::Restarted { build: BUILD, stored: Vec::new() });
-    bench.does(Event::NodeJoined { node: NodeId(0), incarnation: Incarnation(1), info: info() });
-    assert_eq!(asked(&bench), first);
-    let cells = first.iter().map(|cell| (*cell, 0.01)).collect();
-    bench.does(Event::Probed { node: NodeId(0), incarnation: Incarnation(1), job: JOB, cells });
-    assert_eq!(bench.count(EventKind::ProbeFinished), 1);
 }
 
 /// Two nodes are asked for, the prepared one dies while the other one still compiles: nothing is due before that one answers.
