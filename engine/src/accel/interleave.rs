@@ -15,7 +15,7 @@ use super::{
 };
 
 /// Rays under way at a time.
-pub const WALKERS: usize = 12;
+pub const WALKERS: usize = 32;
 
 /// A ray under way.
 struct Walker<R> {
@@ -28,31 +28,52 @@ struct Walker<R> {
     pending: Pending<R>,
 }
 
-/// Places of walkers, by whether they are about to visit a node or a leaf: kept apart so that no branch depends on which it is, of which nobody could
-/// foretell the way.
-#[derive(Clone, Copy, Default)]
-struct Turn {
-    inner: [u8; WALKERS],
-    inner_count: usize,
-    leaf: [u8; WALKERS],
-    leaf_count: usize,
+/// Places of walkers, first in, first out.
+struct Queue {
+    places: [u8; WALKERS],
+    first: usize,
+    end: usize,
 }
 
-impl Turn {
-    /// Notes what a walker visits next, and asks memory for it.
-    ///
-    /// # Safety
-    /// Each walker is noted once a turn.
+/// So that numbers of places wrap without a division.
+const _: () = assert!(WALKERS.is_power_of_two());
+
+impl Queue {
+    const EMPTY: Self = Self { places: [0; WALKERS], first: 0, end: 0 };
+
+    /// Adds a place, if it is to be here.
     #[inline(always)]
-    unsafe fn note(&mut self, place: u8, current: u32, nodes: &[Node], packs: &[Pack]) {
-        let is_leaf = current & LEAF != 0;
-        // SAFETY: of `WALKERS` walkers, fewer were noted.
-        unsafe {
-            *self.inner.get_unchecked_mut(self.inner_count) = place;
-            *self.leaf.get_unchecked_mut(self.leaf_count) = place;
+    fn add(&mut self, place: usize, here: bool) {
+        self.places[self.end % WALKERS] = place as u8;
+        self.end += usize::from(here);
+    }
+
+    /// Takes the first.
+    #[inline(always)]
+    fn take(&mut self) -> Option<usize> {
+        if self.first == self.end {
+            return None;
         }
-        self.inner_count += usize::from(!is_leaf);
-        self.leaf_count += usize::from(is_leaf);
+        let place = self.places[self.first % WALKERS];
+        self.first += 1;
+        Some(place.into())
+    }
+}
+
+/// Places of walkers that are about to visit a node, and of those about to visit a leaf: kept apart so that no branch depends on which it is, of which nobody could
+/// foretell the way.
+struct Turns {
+    inner: Queue,
+    leaf: Queue,
+}
+
+impl Turns {
+    /// Notes what a walker visits next, and asks memory for it.
+    #[inline(always)]
+    fn note(&mut self, place: usize, current: u32, nodes: &[Node], packs: &[Pack]) {
+        let is_leaf = current & LEAF != 0;
+        self.inner.add(place, !is_leaf);
+        self.leaf.add(place, is_leaf);
         let (base, size) =
             if is_leaf { (packs.as_ptr().cast::<u8>(), size_of::<Pack>()) } else { (nodes.as_ptr().cast(), size_of::<Node>()) };
         prefetch::<4>(base.wrapping_add((current & !LEAF) as usize * size));
@@ -67,10 +88,8 @@ impl<V: Visitor> Stream<'_, V> {
     #[inline(always)]
     pub unsafe fn interleave<L: Lanes, R: Left<L>, const ANY: bool>(&mut self, numbers: &[u8], entered: Option<&Entered<R>>) {
         let mut walkers = [const { MaybeUninit::<Walker<R>>::uninit() }; WALKERS];
-        let (mut first, mut second, mut begun) = (Turn::default(), Turn::default(), 0);
-        // Turns about, not copied: what was just written byte by byte would have to be waited for.
-        let (mut now, mut turn) = (&mut first, &mut second);
-        // SAFETY: places of walkers that began are noted. They visit nodes and leaves of this tree, and are never deeper in it than `MAX_DEPTH`.
+        let (mut turns, mut begun) = (Turns { inner: Queue::EMPTY, leaf: Queue::EMPTY }, 0);
+        // SAFETY: places of walkers that began are noted, each in one queue. They visit nodes and leaves of this tree, and are never deeper in it than `MAX_DEPTH`.
         unsafe {
             while begun < WALKERS.min(numbers.len()) {
                 let place = begun;
@@ -82,27 +101,23 @@ impl<V: Visitor> Stream<'_, V> {
                     pending: Pending::new(),
                 });
                 self.begin::<L, R, ANY>(walker, place, numbers, &mut begun, entered);
-                now.note(place as u8, walker.current, self.nodes, self.packs);
+                turns.note(place, walker.current, self.nodes, self.packs);
             }
-            loop {
-                if now.inner_count + now.leaf_count == 0 {
-                    return;
-                }
-                (turn.inner_count, turn.leaf_count) = (0, 0);
-                for &place in now.inner.get_unchecked(..now.inner_count) {
-                    let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
-                    if self.step::<L, R>(walker) || self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun, entered) {
-                        turn.note(place, walker.current, self.nodes, self.packs);
+            // Each kind until none is left, as to turn to the other one costs a branch that goes another way.
+            while turns.inner.first != turns.inner.end || turns.leaf.first != turns.leaf.end {
+                while let Some(place) = turns.inner.take() {
+                    let walker = walkers.get_unchecked_mut(place).assume_init_mut();
+                    if self.step::<L, R>(walker) || self.go_on::<L, R, ANY>(walker, place, numbers, &mut begun, entered) {
+                        turns.note(place, walker.current, self.nodes, self.packs);
                     }
                 }
-                for &place in now.leaf.get_unchecked(..now.leaf_count) {
-                    let walker = walkers.get_unchecked_mut(usize::from(place)).assume_init_mut();
-                    self.visit::<L, ANY>(walker.current & !LEAF, walker.ray, place.into());
-                    if self.go_on::<L, R, ANY>(walker, place.into(), numbers, &mut begun, entered) {
-                        turn.note(place, walker.current, self.nodes, self.packs);
+                while let Some(place) = turns.leaf.take() {
+                    let walker = walkers.get_unchecked_mut(place).assume_init_mut();
+                    self.visit::<L, ANY>(walker.current & !LEAF, walker.ray, place);
+                    if self.go_on::<L, R, ANY>(walker, place, numbers, &mut begun, entered) {
+                        turns.note(place, walker.current, self.nodes, self.packs);
                     }
                 }
-                std::mem::swap(&mut now, &mut turn);
             }
         }
     }
