@@ -14,7 +14,7 @@ use super::{
     visitor::Visitor,
 };
 
-/// Rays under way at a time.
+/// Rays under way at a time: so many that branches that go another way at the end of a queue are few, and so few that all stay close to the processor.
 pub const WALKERS: usize = 32;
 
 /// A ray under way.

@@ -99,7 +99,8 @@ impl<V: Visitor> Stream<'_, V> {
         }
         let Some(packet) = self.block.groups.get(group).and_then(Packet::of) else { return false };
         if ANY {
-            self.block.told.iter_mut().for_each(|told| told.clear());
+            // Those of its own eight.
+            self.block.told.iter_mut().take(8).for_each(|told| told.clear());
         }
         let mut pending = Pending::<R>::new();
         let mut limit = range(&self.block.groups[group].limit).1;
